@@ -1,0 +1,1 @@
+"""Shape Programs: three languages in which neural networks write shapes, and the networks that write them."""

@@ -204,12 +204,14 @@ def _table(instructions: list[tuple], names: tuple[str, ...], order: np.ndarray,
     columns = {name: entries[:, 2 + i] for i, name in enumerate(names)}
     starts = np.flatnonzero(np.diff(entries[:, :2], axis=0, prepend=-1).any(1))
     groups = [
-        Group(int(entries[start, 1]), int(start), int(stop), _padded([earlier.get(i, []) for i in order[start:stop].tolist()]))
+        Group(int(entries[start, 1]), int(start), int(stop), _padded([earlier.get(i, ()) for i in order[start:stop].tolist()]))
         for start, stop in zip(starts, [*starts[1:], len(entries)])
     ]
     return Table(groups, columns)
 
 
 def _padded(lists: list[list[int]]) -> np.ndarray:
-    most = max(map(len, lists), default=0)
+    most = max(map(len, lists))
+    if not most:
+        return np.zeros((len(lists), 0), dtype=np.int64)
     return np.array([[*records, *[-1] * (most - len(records))] for records in lists], dtype=np.int64).reshape(len(lists), most)

@@ -8,9 +8,10 @@ from .errors import ProgramError
 from .executing import execute, execute_many, trace
 from .parsing import parse
 from .program import Attach, Block, Cuboid, Program, Reflect, Squeeze, Translate
+from .sampling import sample
 from .shape import Shape, Shapes
 
 __all__ = [
     "Attach", "Block", "Cuboid", "Program", "ProgramError", "Reflect", "Shape", "Shapes", "Squeeze", "Translate",
-    "execute", "execute_many", "parse", "trace",
+    "execute", "execute_many", "parse", "sample", "trace",
 ]  # fmt: skip

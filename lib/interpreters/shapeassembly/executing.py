@@ -45,15 +45,7 @@ def trace(block: Block) -> list[Shape]:
     """The state of a block after each of its statements, as shapes without hierarchy: imperative semantics made
     visible (paper, Figure 4). The first shape, after the bbox line, has no cuboids."""
     prefixes = [Block(block.name, block.statements[: stop + 1]) for stop in range(len(block.statements))]
-    shapes = []
-    for prefix in prefixes:
-        compiler, layout = Compiler(), Layout()
-        program = Program.unchecked((prefix,))
-        layout.add(program, {prefix.name: compiler.add(prefix)})
-        numbers = [n for s in prefix.statements for n in s.numbers]
-        boxes = place(layout, Machine(compiler, torch.tensor([numbers], dtype=torch.float64)).state)
-        shapes.append(Shapes([program], layout, boxes)[0])
-    return shapes
+    return list(execute_many([Program.unchecked((prefix,)) for prefix in prefixes]))
 
 
 def _run(programs: list[Program], parameters: Float[Tensor, "variants p"]) -> Shapes:

@@ -1,0 +1,1 @@
+"""What makes a model, or a program, fit: losses and loops."""

@@ -1,0 +1,83 @@
+"""Fit the numbers of a program to a point cloud: gradient descent through the interpreter (paper, section 7.3)."""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+from tqdm.auto import tqdm
+
+from ..interpreters.cuboids import Cuboids
+from ..interpreters.shapeassembly import Program, ProgramError, execute
+from ..metrics.points import chamfer_distance
+
+SMALLEST = 0.01  # of a cuboid's side, world units, while fitting
+
+
+@dataclass(frozen=True)
+class Fit:
+    """history: losses (steps,), and every parameter vector (steps, p); parameters: those with the lowest loss."""
+
+    losses: Float[Tensor, " steps"]
+    path: Float[Tensor, "steps p"]
+
+    @property
+    def best(self) -> int:
+        """The step with the lowest loss."""
+        return int(self.losses.argmin())
+
+    @property
+    def parameters(self) -> Float[Tensor, " p"]:
+        return self.path[self.best]
+
+
+def fit_program(
+    program: Program, target: Float[Tensor, "m 3"], steps: int = 150, rate: float = 0.01, points: int = 512
+) -> Fit:
+    """Adam on the program's continuous parameters; the loss is the Chamfer distance to `target`, world units.
+
+    Each step samples `points` fresh surface points (seeded by the step). Sizes stay above SMALLEST, coordinates in
+    [0, 1]. Raises ProgramError where the geometry stops being finite.
+    """
+    low, high = _limits(program)
+    vector = program.parameters().clamp(low, high)
+    return _descend(vector, lambda v, step: execute(program, v).surface_points(points, step), target, steps, rate,
+                    lambda v: v.clamp(low, high))  # fmt: skip
+
+
+def fit_cuboids(start: Cuboids, target: Float[Tensor, "m 3"], steps: int = 150, rate: float = 0.01, points: int = 512) -> Fit:
+    """The same descent on free boxes: six numbers each, size and center, with nothing to hold them together."""
+    vector = torch.cat([start.size, start.center], -1).detach().flatten()
+    clamp = lambda v: free_cuboids(v, start, SMALLEST)
+    surface = lambda v, step: clamp(v).surface_points(points, step)
+    return _descend(vector, surface, target, steps, rate, lambda v: v)
+
+
+def free_cuboids(vector: Float[Tensor, " p"], start: Cuboids, smallest: float = 0.0) -> Cuboids:
+    """Boxes from a vector of `fit_cuboids`; their axes are those of `start`."""
+    size, center = vector.reshape(-1, 6).split(3, dim=-1)
+    return Cuboids(size.clamp(min=smallest), center, start.axes.detach())
+
+
+def _descend(vector: Tensor, surface, target: Tensor, steps: int, rate: float, keep) -> Fit:
+    vector = vector.detach().clone().requires_grad_()
+    optimizer = torch.optim.Adam([vector], lr=rate)
+    losses, path = [], []
+    for step in tqdm(range(steps), desc="fitting", leave=False):
+        loss = chamfer_distance(surface(vector, step), target.to(vector))
+        if not loss.isfinite():
+            raise ProgramError(f"step {step}: the distance to the target is not finite", expected="a smaller rate")
+        losses.append(loss.detach())
+        path.append(vector.detach().clone())
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        with torch.no_grad():
+            vector.copy_(keep(vector))
+    return Fit(torch.stack(losses), torch.stack(path))
+
+
+def _limits(program: Program) -> tuple[Tensor, Tensor]:
+    """Smallest and largest value of each parameter while fitting: sizes positive, coordinates in [0, 1]."""
+    is_size = torch.tensor([name.split(":")[2] == "Cuboid" for name in program.parameter_names()])
+    return torch.where(is_size, SMALLEST, 0.0).double(), torch.where(is_size, torch.inf, 1.0).double()

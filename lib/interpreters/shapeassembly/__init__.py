@@ -6,6 +6,7 @@
 
 from .errors import ProgramError
 from .executing import execute, execute_many, trace
+from .expanding import expand
 from .parsing import parse
 from .program import Attach, Block, Cuboid, Program, Reflect, Squeeze, Translate
 from .sampling import sample
@@ -13,5 +14,5 @@ from .shape import Shape, Shapes
 
 __all__ = [
     "Attach", "Block", "Cuboid", "Program", "ProgramError", "Reflect", "Shape", "Shapes", "Squeeze", "Translate",
-    "execute", "execute_many", "parse", "sample", "trace",
+    "execute", "execute_many", "expand", "parse", "sample", "trace",
 ]  # fmt: skip

@@ -30,10 +30,12 @@ class Group:
 
 @dataclass
 class Table:
-    """Instructions sorted into groups. `columns[name]` has a row per instruction."""
+    """Instructions sorted into groups. `columns[name]` has a row per instruction; `order` tells where each row
+    stood in the program."""
 
     groups: list[Group]
     columns: dict[str, np.ndarray]
+    order: np.ndarray
 
 
 class Expansion:
@@ -74,16 +76,14 @@ class Compiler:
 
     def build_table(self) -> Table:
         """The attaches that build the blocks."""
-        self._order = _wave_order(self._build)
-        self._position = np.argsort(self._order)
-        return _table(self._build, self.BUILD, self._order, _renumber(self._build_earlier, self._position, 0))
+        order = _wave_order(self._build)
+        return _table(self._build, self.BUILD, order, _renumber(self._build_earlier, np.argsort(order), 0))
 
-    def copy_table(self) -> Table:
+    def copy_table(self, build: Table) -> Table:
         """The attaches of clones, after all building is done. Numbered on from the building instructions."""
-        order, built = _wave_order(self._copy), len(self._build)
-        records = _renumber(self._copy_earlier, np.argsort(order), built)
-        table = _table(self._copy, self.COPY, order, records)
-        table.columns["copied"] = self._position[table.columns["copied"]] if built else table.columns["copied"]
+        order = _wave_order(self._copy)
+        table = _table(self._copy, self.COPY, order, _renumber(self._copy_earlier, np.argsort(order), len(build.order)))
+        table.columns["copied"] = np.argsort(build.order)[table.columns["copied"]]
         return table
 
     def _cuboid(self, statement: Cuboid, first: int, state: "_BlockState") -> None:
@@ -207,7 +207,7 @@ def _table(instructions: list[tuple], names: tuple[str, ...], order: np.ndarray,
         Group(int(entries[start, 1]), int(start), int(stop), _padded([earlier.get(i, ()) for i in order[start:stop].tolist()]))
         for start, stop in zip(starts, [*starts[1:], len(entries)])
     ]
-    return Table(groups, columns)
+    return Table(groups, columns, order)
 
 
 def _padded(lists: list[list[int]]) -> np.ndarray:

@@ -23,7 +23,7 @@ def execute(program: Program, parameters: Float[Tensor, "*batch p"] | None = Non
     """
     if parameters is None:
         return execute_many([program])[0]
-    wanted = sum(len(statement.numbers) for _, _, statement in program.statements())
+    wanted = program.parameter_count
     if parameters.ndim not in (1, 2) or parameters.shape[-1] != wanted:
         raise ProgramError(f"parameters of shape {tuple(parameters.shape)}", expected=f"({wanted},) or (batch, {wanted})")
     shapes = _run([program], torch.atleast_2d(parameters))

@@ -26,19 +26,20 @@ class Machine:
         size = self.values[:, self._index(compiler.sizes).reshape(-1, 3)]
         eye = torch.eye(3, dtype=size.dtype, device=self.device)
         self.state = Cuboids(size, torch.zeros_like(size), eye.repeat(*size.shape[:2], 1, 1))
-        self._build(compiler)
+        self.build = compiler.build_table()
+        self.copy = compiler.copy_table(self.build)
+        self._run_all(compiler)
 
-    def _build(self, compiler: Compiler) -> None:
-        build, copy = compiler.build_table(), compiler.copy_table()
-        built, copied = len(build.columns["moved"]), len(copy.columns["moved"])
+    def _run_all(self, compiler: Compiler) -> None:
+        built, copied = len(self.build.order), len(self.copy.order)
         empty = self.values.new_zeros(len(self.values), built + copied, 3)
         # What every attach left behind: local points of both cuboids, and the target, frozen at that moment.
         self.points, self.targets = empty.repeat(1, 2, 1), empty
-        self._run(build, 0, self._written_points)
+        self._run(self.build, 0, self._written_points)
         if compiler.clones:
             clones, sources = self._index(compiler.clones), self._index(compiler.sources)
             self.state.size[:, clones] = self.state.size[:, sources]
-        self._run(copy, built, self._copied_points)
+        self._run(self.copy, built, self._copied_points)
 
     def _run(self, table: Table, offset: int, points) -> None:
         columns = {name: self._index(column) for name, column in table.columns.items()}

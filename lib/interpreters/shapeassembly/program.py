@@ -159,6 +159,11 @@ class Program:
             for index, statement in enumerate(block.statements):
                 yield block, index, statement
 
+    @property
+    def parameter_count(self) -> int:
+        """p: how many continuous parameters the program has."""
+        return sum(len(statement.numbers) for _, _, statement in self.statements())
+
     def parameters(self) -> Tensor:
         """(p,) float64: every continuous parameter, in text order."""
         numbers = [n for _, _, statement in self.statements() for n in statement.numbers]
@@ -175,9 +180,8 @@ class Program:
     def with_parameters(self, parameters: Tensor | Sequence[float]) -> "Program":
         """The same structure with other numbers, (p,). Raises ProgramError for a wrong count or bad numbers."""
         numbers = torch.as_tensor(parameters, dtype=torch.float64).detach().flatten().tolist()
-        wanted = sum(len(statement.numbers) for _, _, statement in self.statements())
-        if len(numbers) != wanted:
-            raise ProgramError(f"{len(numbers)} parameters given", expected=f"{wanted} for this program")
+        if len(numbers) != self.parameter_count:
+            raise ProgramError(f"{len(numbers)} parameters given", expected=f"{self.parameter_count} for this program")
         rest = iter(numbers)
         return Program(tuple(
             replace(block, statements=tuple(

@@ -56,11 +56,11 @@ class Cuboids:
         """Local coordinates of one world point per box."""
         return self.local_many(points.unsqueeze(-2)).squeeze(-2)
 
-    def world_many(self, q: Float[Tensor, "*n m 3"]) -> Float[Tensor, "*n m 3"]:
-        """World positions of m local points per box."""
+    def world_many(self, q: Float[Tensor, "*#n m 3"]) -> Float[Tensor, "*n m 3"]:
+        """World positions of m local points per box; (m, 3) are the same points in every box."""
         return self.center.unsqueeze(-2) + ((q - 0.5) * self.size.unsqueeze(-2)) @ self.axes
 
-    def local_many(self, points: Float[Tensor, "*n m 3"]) -> Float[Tensor, "*n m 3"]:
+    def local_many(self, points: Float[Tensor, "*#n m 3"]) -> Float[Tensor, "*n m 3"]:
         """Local coordinates of m world points per box. A box without volume gives inf or NaN."""
         offset = (points - self.center.unsqueeze(-2)) @ inverse_axes(self.axes)
         return offset / self.size.unsqueeze(-2) + 0.5
@@ -95,8 +95,11 @@ class Cuboids:
         generator = torch.Generator().manual_seed(seed)
         box, q = _draw_on_faces(self.size.detach().abs().cpu(), n, generator)
         box, q = box.to(self.size.device), q.to(self.size)
-        pick = lambda t, tail: t.gather(-1 - len(tail), box.reshape(*box.shape, *(1 for _ in tail)).expand(*box.shape, *tail))
-        chosen = Cuboids(pick(self.size, (3,)), pick(self.center, (3,)), pick(self.axes, (3, 3)))
+        vectors = box.unsqueeze(-1).expand(*box.shape, 3)
+        matrices = box[..., None, None].expand(*box.shape, 3, 3)
+        chosen = Cuboids(
+            self.size.gather(-2, vectors), self.center.gather(-2, vectors), self.axes.gather(-3, matrices)
+        )
         return chosen.world(q)
 
 
@@ -104,8 +107,10 @@ def _draw_on_faces(
     size: Float[Tensor, "*batch boxes 3"], n: int, generator: torch.Generator
 ) -> tuple[Int[Tensor, "*batch n"], Float[Tensor, "*batch n 3"]]:
     """For n points: which box, and the local coordinates on one of its six faces, weighted by area."""
-    area = torch.stack([size[..., 1] * size[..., 2], size[..., 0] * size[..., 2], size[..., 0] * size[..., 1]], -1)
-    weight = area.repeat_interleave(2, -1).flatten(-2)  # (*batch, boxes * 6): left, right, bottom, top, back, front
+    length, height, width = size.unbind(-1)
+    area = torch.stack([height * width, length * width, length * height], -1)
+    # (*batch, boxes * 6): left, right, bottom, top, back, front of each box
+    weight = area.repeat_interleave(2, -1).flatten(-2)
     batch = weight.shape[:-1]
     cumulative = weight.double().cumsum(-1)
     at = torch.rand(*batch, n, dtype=torch.float64, generator=generator) * cumulative[..., -1:]
@@ -130,5 +135,8 @@ def cross(a: Float[Tensor, "*n 3"], b: Float[Tensor, "*n 3"]) -> Float[Tensor, "
 
 def concatenate(parts: list[Cuboids], dim: int = 0) -> Cuboids:
     """Several batches of boxes as one, joined along `dim`."""
-    join = lambda name: torch.cat([getattr(part, name) for part in parts], dim)
-    return Cuboids(join("size"), join("center"), join("axes"))
+    return Cuboids(
+        torch.cat([part.size for part in parts], dim),
+        torch.cat([part.center for part in parts], dim),
+        torch.cat([part.axes for part in parts], dim),
+    )

@@ -5,7 +5,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 
-def chamfer_distance(a: Float[Tensor, "*batch n 3"], b: Float[Tensor, "*batch m 3"]) -> Float[Tensor, "*batch"]:
+def chamfer_distance(
+    a: Float[Tensor, "*batch n 3"], b: Float[Tensor, "*batch m 3"]
+) -> Float[Tensor, "*batch"]:
     """Sum of the two mean distances from each point to its nearest neighbour in the other cloud, world units.
 
     Euclidean, not squared; differentiable in both clouds; leading dimensions are a batch. With about 1,000 points

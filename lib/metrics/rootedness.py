@@ -59,14 +59,13 @@ def _edge_distance(a: Cuboids, b: Cuboids) -> Float[Tensor, " n"]:
     ends_a, ends_b = a.corners()[:, _EDGES].unsqueeze(2), b.corners()[:, _EDGES].unsqueeze(1)
     p, u = ends_a[..., 0, :], ends_a[..., 1, :] - ends_a[..., 0, :]
     q, v = ends_b[..., 0, :], ends_b[..., 1, :] - ends_b[..., 0, :]
-    dot = lambda x, y: (x * y).sum(-1)
-    uu, uv, vv, w = dot(u, u), dot(u, v), dot(v, v), p - q
+    w = p - q
+    uu, uv, vv, uw, vw = (u * u).sum(-1), (u * v).sum(-1), (v * v).sum(-1), (u * w).sum(-1), (v * w).sum(-1)
     determinant = uu * vv - uv * uv
     parallel = determinant < 1e-12 * uu * vv  # then the nearest points include a corner, measured elsewhere
-    s = (uv * dot(v, w) - vv * dot(u, w)) / torch.where(parallel, 1.0, determinant)
-    s = s.clamp(0, 1)
-    t = ((uv * s + dot(v, w)) / vv).clamp(0, 1)
-    s = ((uv * t - dot(u, w)) / uu).clamp(0, 1)
+    s = ((uv * vw - vv * uw) / torch.where(parallel, 1.0, determinant)).clamp(0, 1)
+    t = ((uv * s + vw) / vv).clamp(0, 1)
+    s = ((uv * t - uw) / uu).clamp(0, 1)
     gap = (w + s.unsqueeze(-1) * u - t.unsqueeze(-1) * v).norm(dim=-1)
     return gap.flatten(1).amin(-1)
 

@@ -1,11 +1,12 @@
 """Fit the numbers of a program to a point cloud: gradient descent through the interpreter (paper, section 7.3)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
-from tqdm.auto import tqdm
+from tqdm import tqdm
 
 from ..interpreters.cuboids import Cuboids
 from ..interpreters.shapeassembly import Program, ProgramError, execute
@@ -40,40 +41,58 @@ def fit_program(
     [0, 1]. Raises ProgramError where the geometry stops being finite.
     """
     low, high = _limits(program)
-    vector = program.parameters().clamp(low, high)
-    return _descend(vector, lambda v, step: execute(program, v).surface_points(points, step), target, steps, rate,
-                    lambda v: v.clamp(low, high))  # fmt: skip
+
+    def surface(vector: Tensor, step: int) -> Tensor:
+        return execute(program, vector).surface_points(points, step)
+
+    return _descend(program.parameters(), (low, high), surface, target, steps, rate)
 
 
-def fit_cuboids(start: Cuboids, target: Float[Tensor, "m 3"], steps: int = 150, rate: float = 0.01, points: int = 512) -> Fit:
+def fit_cuboids(
+    start: Cuboids, target: Float[Tensor, "m 3"], steps: int = 150, rate: float = 0.01, points: int = 512
+) -> Fit:
     """The same descent on free boxes: six numbers each, size and center, with nothing to hold them together."""
-    vector = torch.cat([start.size, start.center], -1).detach().flatten()
-    clamp = lambda v: free_cuboids(v, start, SMALLEST)
-    surface = lambda v, step: clamp(v).surface_points(points, step)
-    return _descend(vector, surface, target, steps, rate, lambda v: v)
+    vector = torch.cat([start.size, start.center], -1)
+    low = torch.cat([torch.full_like(start.size, SMALLEST), torch.full_like(start.center, -torch.inf)], -1)
+
+    def surface(vector: Tensor, step: int) -> Tensor:
+        return free_cuboids(vector, start).surface_points(points, step)
+
+    limits = low.flatten(), torch.full_like(low, torch.inf).flatten()
+    return _descend(vector.flatten(), limits, surface, target, steps, rate)
 
 
-def free_cuboids(vector: Float[Tensor, " p"], start: Cuboids, smallest: float = 0.0) -> Cuboids:
+def free_cuboids(vector: Float[Tensor, " p"], start: Cuboids) -> Cuboids:
     """Boxes from a vector of `fit_cuboids`; their axes are those of `start`."""
     size, center = vector.reshape(-1, 6).split(3, dim=-1)
-    return Cuboids(size.clamp(min=smallest), center, start.axes.detach())
+    return Cuboids(size, center, start.axes.detach())
 
 
-def _descend(vector: Tensor, surface, target: Tensor, steps: int, rate: float, keep) -> Fit:
-    vector = vector.detach().clone().requires_grad_()
+def _descend(
+    vector: Float[Tensor, " p"],
+    limits: tuple[Tensor, Tensor],
+    surface: Callable[[Tensor, int], Tensor],
+    target: Float[Tensor, "m 3"],
+    steps: int,
+    rate: float,
+) -> Fit:
+    """Adam from `vector`, kept within `limits`; surface(vector, step) gives the points to compare."""
+    vector = vector.detach().clamp(*limits).requires_grad_()
     optimizer = torch.optim.Adam([vector], lr=rate)
     losses, path = [], []
-    for step in tqdm(range(steps), desc="fitting", leave=False):
+    for step in tqdm(range(steps), desc="fitting", leave=False, disable=None):
         loss = chamfer_distance(surface(vector, step), target.to(vector))
         if not loss.isfinite():
-            raise ProgramError(f"step {step}: the distance to the target is not finite", expected="a smaller rate")
+            raise ProgramError(
+                f"step {step}: the distance to the target is not finite", expected="a smaller rate"
+            )
         losses.append(loss.detach())
         path.append(vector.detach().clone())
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
         with torch.no_grad():
-            vector.copy_(keep(vector))
+            vector.clamp_(*limits)
     return Fit(torch.stack(losses), torch.stack(path))
 
 

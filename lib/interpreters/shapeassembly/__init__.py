@@ -1,7 +1,7 @@
 """ShapeAssembly: cuboids attached to one another in a hierarchy (Jones et al. 2020). Four verbs and an error.
 
-    parse(text) -> Program          execute(program) -> Shape
-    sample(rng) -> Program          execute_many(programs) -> Shapes
+parse(text) -> Program          execute(program) -> Shape
+sample(rng) -> Program          execute_many(programs) -> Shapes
 """
 
 from .errors import ProgramError

@@ -32,7 +32,9 @@ def move(cuboid: Cuboids, point: Points, target: Points) -> Cuboids:
     return Cuboids(cuboid.size, cuboid.center + target - cuboid.world(point), cuboid.axes)
 
 
-def stretch_and_turn(cuboid: Cuboids, point: Points, target: Points, fixed_point: Points, fixed: Points) -> Cuboids:
+def stretch_and_turn(
+    cuboid: Cuboids, point: Points, target: Points, fixed_point: Points, fixed: Points
+) -> Cuboids:
     """One earlier attachment, at local `fixed_point`, world `fixed`: scale along one axis, then rotate.
 
     Scaling gives the line from the fixed point to the source point the right length; of the axes that can, the
@@ -40,7 +42,11 @@ def stretch_and_turn(cuboid: Cuboids, point: Points, target: Points, fixed_point
     point to the target. A side may come out negative: nothing in the language forbids it.
     """
     there = _length(cuboid.world(point) - target) < CLOSE_ENOUGH
-    stretched = _pin(Cuboids(_stretch(cuboid, point, target, fixed_point, fixed), cuboid.center, cuboid.axes), fixed_point, fixed)
+    stretched = _pin(
+        Cuboids(_stretch(cuboid, point, target, fixed_point, fixed), cuboid.center, cuboid.axes),
+        fixed_point,
+        fixed,
+    )
     now, wanted = stretched.world(point) - fixed, target - fixed
     still = (_length(now) == 0) | (_length(wanted) == 0) | (_length(now - wanted) < CLOSE_ENOUGH)
     axes = stretched.axes @ minimal_rotation(now, wanted).mT
@@ -50,7 +56,9 @@ def stretch_and_turn(cuboid: Cuboids, point: Points, target: Points, fixed_point
 
 def _stretch(cuboid: Cuboids, point: Points, target: Points, fixed_point: Points, fixed: Points) -> Points:
     """New sizes that put the source point at the target's distance from the fixed point, where possible."""
-    lever = (point - 0.5).unsqueeze(-1) * cuboid.axes  # (rows, axis, 3): how the source point moves with each size
+    lever = (point - 0.5).unsqueeze(
+        -1
+    ) * cuboid.axes  # (rows, axis, 3): how the source point moves with each size
     fixed_lever = (fixed_point - 0.5).unsqueeze(-1) * cuboid.axes
     offset, distance = cuboid.world(point) - fixed, _square(target - fixed)
     change, possible = _reach(lever - fixed_lever, offset.unsqueeze(-2), distance.unsqueeze(-1))
@@ -66,7 +74,9 @@ def _stretch(cuboid: Cuboids, point: Points, target: Points, fixed_point: Points
     return cuboid.size + torch.where(usable.any(-1, keepdim=True), alone, together)
 
 
-def _reach(v: Float[Tensor, "*n 3"], u: Float[Tensor, "*n 3"], square: Float[Tensor, "*n"]) -> tuple[Tensor, Tensor]:
+def _reach(
+    v: Float[Tensor, "*n 3"], u: Float[Tensor, "*#n 3"], square: Float[Tensor, "*#n"]
+) -> tuple[Tensor, Tensor]:
     """Larger root s of |u + s v|^2 = square, and whether there are two different ones."""
     a, b, c = _square(v), 2 * (u * v).sum(-1), _square(u) - square
     discriminant = b * b - 4 * a * c
@@ -94,7 +104,11 @@ def minimal_rotation(start: Points, end: Points) -> Float[Tensor, "rows 3 3"]:
 
 def _half_turn(u: Points) -> Float[Tensor, "rows 3 3"]:
     x, y, z = u.unbind(-1)
-    first, second, third = torch.stack([x, -z, y], -1), torch.stack([z, y, -x], -1), torch.stack([-y, x, z], -1)
+    first, second, third = (
+        torch.stack([x, -z, y], -1),
+        torch.stack([z, y, -x], -1),
+        torch.stack([-y, x, z], -1),
+    )
     axis = torch.where((x != 0)[:, None], first, torch.where((y != 0)[:, None], second, third))
     axis = _unit(axis)
     return 2 * axis.unsqueeze(-1) * axis.unsqueeze(-2) - _eye(u)
@@ -117,7 +131,9 @@ def orient_and_extend(
     return _extend(oriented, point, target, fixed_points, fixed, known)
 
 
-def _on_a_line(fixed: Float[Tensor, "rows earlier 3"], known: Bool[Tensor, "rows earlier"]) -> Bool[Tensor, " rows"]:
+def _on_a_line(
+    fixed: Float[Tensor, "rows earlier 3"], known: Bool[Tensor, "rows earlier"]
+) -> Bool[Tensor, " rows"]:
     line = (fixed[:, 1] - fixed[:, 0]).unsqueeze(1)
     away = cross(fixed - fixed[:, :1], line.expand_as(fixed)).norm(dim=-1)
     return ~((away > ON_TARGET) & known)[:, 2:].any(-1)
@@ -132,9 +148,8 @@ def _orient(cuboid: Cuboids, point: Points, target: Points, fixed_points: Tensor
     between = fixed[:, 0] - fixed[:, 1]
     line = between / (_length(between).unsqueeze(-1) + TINY)
     source = cuboid.world(point)
-    flat = lambda p: p - line * (((p - source) * line).sum(-1) / (_square(line) + TINY)).unsqueeze(-1)
-    pivot = flat(fixed[:, 0])
-    now, wanted = source - pivot, flat(target) - pivot
+    pivot = _project(fixed[:, 0], source, line)
+    now, wanted = source - pivot, _project(target, source, line) - pivot
     scale, _ = _reach(now, now, _square(wanted))  # compare directions only: give both the same length
     now = now * (1 + scale).unsqueeze(-1)
     still = (_length(now) == 0) | (_length(wanted) == 0) | (_length(now - wanted) < ON_TARGET)
@@ -142,7 +157,14 @@ def _orient(cuboid: Cuboids, point: Points, target: Points, fixed_points: Tensor
     turn = _turn_about(line, u, v)
     missed = _length((turn @ u.unsqueeze(-1)).squeeze(-1) - v) > ON_TARGET
     turn = torch.where(missed[:, None, None], _turn_about(-line, u, v), turn)
-    return choose(still, cuboid, _pin(Cuboids(cuboid.size, cuboid.center, cuboid.axes @ turn.mT), fixed_points[:, 0], fixed[:, 0]))
+    turned = Cuboids(cuboid.size, cuboid.center, cuboid.axes @ turn.mT)
+    return choose(still, cuboid, _pin(turned, fixed_points[:, 0], fixed[:, 0]))
+
+
+def _project(points: Points, origin: Points, normal: Points) -> Points:
+    """Points moved along `normal` onto the plane through `origin`."""
+    height = ((points - origin) * normal).sum(-1) / (_square(normal) + TINY)
+    return points - normal * height.unsqueeze(-1)
 
 
 def _turn_about(axis: Points, u: Points, v: Points) -> Float[Tensor, "rows 3 3"]:
@@ -152,7 +174,9 @@ def _turn_about(axis: Points, u: Points, v: Points) -> Float[Tensor, "rows 3 3"]
     return cosine * _eye(axis) + sine * _skew(axis) + (1 - cosine) * axis.unsqueeze(-1) * axis.unsqueeze(-2)
 
 
-def _extend(cuboid: Cuboids, point: Points, target: Points, fixed_points: Tensor, fixed: Tensor, known: Tensor) -> Cuboids:
+def _extend(
+    cuboid: Cuboids, point: Points, target: Points, fixed_points: Tensor, fixed: Tensor, known: Tensor
+) -> Cuboids:
     """Grow along the face normal that looks at the target, if the fixed points allow it. Never shrinks.
 
     Quirk: when the source point has the same coordinate along that axis as the first fixed point, growing cannot
@@ -162,13 +186,17 @@ def _extend(cuboid: Cuboids, point: Points, target: Points, fixed_points: Tensor
     gap = target - source
     lever = (point - 0.5).unsqueeze(-1) * cuboid.axes  # (rows, axis, 3)
     normal = lever / (_length(lever).unsqueeze(-1) + TINY)
-    spread = (fixed_points - fixed_points[:, :1]).abs() * _length(cuboid.axes).unsqueeze(1)  # (rows, earlier, axis)
+    spread = (fixed_points - fixed_points[:, :1]).abs() * _length(cuboid.axes).unsqueeze(
+        1
+    )  # (rows, earlier, axis)
     free = ((spread <= ON_TARGET) | ~known.unsqueeze(-1)).all(1)
     facing = (normal * _unit(gap).unsqueeze(-2)).sum(-1) > FACING
     usable = free & facing & (_length(gap) >= ON_TARGET).unsqueeze(-1)
     chosen = torch.zeros_like(usable)
     for axis in _SIZE_ORDER:  # the last one wins
-        chosen = torch.where(usable[:, axis, None], torch.eye(3, dtype=torch.bool, device=usable.device)[axis], chosen)
+        chosen = torch.where(
+            usable[:, axis, None], torch.eye(3, dtype=torch.bool, device=usable.device)[axis], chosen
+        )
     fixed_lever = (fixed_points[:, 0] - 0.5).unsqueeze(-1) * cuboid.axes
     amount = (normal * gap.unsqueeze(-2)).sum(-1).abs() / (_length(lever - fixed_lever) + TINY)
     grown = Cuboids(cuboid.size + torch.where(chosen, amount, 0.0), cuboid.center, cuboid.axes)

@@ -48,14 +48,20 @@ def _check_numbers(b, s, statement, source) -> None:
         if not math.isfinite(number):
             raise source.error(b, s, str(number), f"{number} is not finite", "a finite number")
         if isinstance(statement, Cuboid) and number <= 0:
-            raise source.error(b, s, str(number), f"{statement.name} has a side of {number}", "a size above 0")
+            raise source.error(
+                b, s, str(number), f"{statement.name} has a side of {number}", "a size above 0"
+            )
 
 
 def _check_cuboid(b, s, cuboid, source, declared, block_names) -> None:
     if cuboid.name in declared:
-        raise source.error(b, s, cuboid.name, f"{cuboid.name!r} is declared twice in this block", "a new name")
+        raise source.error(
+            b, s, cuboid.name, f"{cuboid.name!r} is declared twice in this block", "a new name"
+        )
     if cuboid.name.startswith("Program_") and cuboid.name not in block_names:
-        raise source.error(b, s, cuboid.name, f"no block fills {cuboid.name!r}", f"'Assembly {cuboid.name} {{'")
+        raise source.error(
+            b, s, cuboid.name, f"no block fills {cuboid.name!r}", f"'Assembly {cuboid.name} {{'"
+        )
     if len(declared) >= MAX_CUBOIDS:
         raise source.error(b, s, cuboid.name, "too many cuboids", f"at most {MAX_CUBOIDS}")
 
@@ -71,8 +77,12 @@ def _check_names(b, s, statement, source, declared, grounded) -> None:
             raise source.error(b, s, name, f"unknown cuboid {name!r}", "a cuboid declared in this block")
     for name in partners:
         if name not in grounded or (moving and name == statement.moved):
-            what = "attached to itself" if moving and name == statement.moved else "not attached to anything yet"
-            raise source.error(b, s, name, f"{name!r} is {what}", "a cuboid that is connected to the bounding box")
+            what = (
+                "attached to itself" if moving and name == statement.moved else "not attached to anything yet"
+            )
+            raise source.error(
+                b, s, name, f"{name!r} is {what}", "a cuboid that is connected to the bounding box"
+            )
     if not moving and statement.source == BBOX:
         raise source.error(b, s, BBOX, "the bounding box cannot be copied", "another cuboid")
 
@@ -96,7 +106,9 @@ def _check_clone_names(b, block, source, declared) -> None:
     for s, statement in enumerate(block.statements):
         copies = clone_count(statement)
         if count + copies > MAX_CUBOIDS:
-            raise source.error(b, s, str(copies), f"{copies} copies make too many cuboids", f"at most {MAX_CUBOIDS}")
+            raise source.error(
+                b, s, str(copies), f"{copies} copies make too many cuboids", f"at most {MAX_CUBOIDS}"
+            )
         for number in range(count, count + copies):
             if f"cube{number}" in declared:
                 raise source.error(b, declared[f"cube{number}"], f"cube{number}",
@@ -109,7 +121,9 @@ def _check_hierarchy(blocks: tuple[Block, ...], source: Source) -> None:
     """The root reaches every block, no block contains itself, and the whole stays below MAX_CUBOIDS boxes."""
     index = {block.name: b for b, block in enumerate(blocks)}
     boxes: dict[str, int] = {}  # executed boxes inside each finished block
-    open_blocks: list[tuple[str, list[tuple[int, str, int]]]] = [(blocks[0].name, _children(blocks[0], index))]
+    open_blocks: list[tuple[str, list[tuple[int, str, int]]]] = [
+        (blocks[0].name, _children(blocks[0], index))
+    ]
     path = [blocks[0].name]
     while open_blocks:
         name, waiting = open_blocks[-1]
@@ -126,12 +140,16 @@ def _check_hierarchy(blocks: tuple[Block, ...], source: Source) -> None:
         own = len(_cuboids(block)) - 1 + sum(map(clone_count, block.statements))
         boxes[name] = own + sum(copies * boxes[child] for _, child, copies in inside)
         if boxes[name] > MAX_CUBOIDS:
-            raise source.error(index[name], -1, name, f"block {name!r} makes {boxes[name]} cuboids", f"at most {MAX_CUBOIDS}")
+            raise source.error(
+                index[name], -1, name, f"block {name!r} makes {boxes[name]} cuboids", f"at most {MAX_CUBOIDS}"
+            )
         open_blocks.pop()
         path.pop()
     for b, block in enumerate(blocks):
         if block.name not in boxes:
-            raise source.error(b, -1, block.name, f"block {block.name!r} is never used", "a cuboid of that name")
+            raise source.error(
+                b, -1, block.name, f"block {block.name!r} is never used", "a cuboid of that name"
+            )
 
 
 def _cuboids(block: Block) -> list[Cuboid]:

@@ -82,7 +82,9 @@ class Compiler:
     def copy_table(self, build: Table) -> Table:
         """The attaches of clones, after all building is done. Numbered on from the building instructions."""
         order = _wave_order(self._copy)
-        table = _table(self._copy, self.COPY, order, _renumber(self._copy_earlier, np.argsort(order), len(build.order)))
+        table = _table(
+            self._copy, self.COPY, order, _renumber(self._copy_earlier, np.argsort(order), len(build.order))
+        )
         table.columns["copied"] = np.argsort(build.order)[table.columns["copied"]]
         return table
 
@@ -122,7 +124,9 @@ class Compiler:
         for step in range(1, statement.count + 1):
             self._clone(statement, state, step, statement.count, first)
 
-    def _clone(self, statement: Reflect | Translate, state: "_BlockState", step: int, steps: int, distance: int) -> str:
+    def _clone(
+        self, statement: Reflect | Translate, state: "_BlockState", step: int, steps: int, distance: int
+    ) -> str:
         """A copy of a cuboid, attached wherever its source was moved by an attach (paper, Appendix B)."""
         rows, source = state.names.rows, statement.source
         clone = f"cube{len(rows) - 1}"
@@ -138,7 +142,18 @@ class Compiler:
             if case in TURNING:
                 self._copy_earlier[len(self._copy)] = list(records)
             records.append(2 * len(self._copy))
-            entry = (rows[clone], rows[still], copied, rows[source], rows[BBOX], axis, mirrored, distance, step, steps)
+            entry = (
+                rows[clone],
+                rows[still],
+                copied,
+                rows[source],
+                rows[BBOX],
+                axis,
+                mirrored,
+                distance,
+                step,
+                steps,
+            )
             self._copy.append((wave, case, *entry))
         return clone
 
@@ -196,15 +211,24 @@ def _wave_order(instructions: list[tuple]) -> np.ndarray:
 
 def _renumber(earlier: dict[int, list[int]], position: np.ndarray, first: int) -> dict[int, list[int]]:
     """Record numbers after sorting; keys stay the instructions' numbers before it."""
-    return {i: [2 * (first + int(position[r // 2])) + r % 2 for r in records] for i, records in earlier.items()}
+    return {
+        i: [2 * (first + int(position[r // 2])) + r % 2 for r in records] for i, records in earlier.items()
+    }
 
 
-def _table(instructions: list[tuple], names: tuple[str, ...], order: np.ndarray, earlier: dict[int, list[int]]) -> Table:
+def _table(
+    instructions: list[tuple], names: tuple[str, ...], order: np.ndarray, earlier: dict[int, list[int]]
+) -> Table:
     entries = np.array(instructions, dtype=np.int64).reshape(-1, 2 + len(names))[order]
     columns = {name: entries[:, 2 + i] for i, name in enumerate(names)}
     starts = np.flatnonzero(np.diff(entries[:, :2], axis=0, prepend=-1).any(1))
     groups = [
-        Group(int(entries[start, 1]), int(start), int(stop), _padded([earlier.get(i, ()) for i in order[start:stop].tolist()]))
+        Group(
+            int(entries[start, 1]),
+            int(start),
+            int(stop),
+            _padded([earlier.get(i, []) for i in order[start:stop].tolist()]),
+        )
         for start, stop in zip(starts, [*starts[1:], len(entries)])
     ]
     return Table(groups, columns, order)
@@ -214,4 +238,6 @@ def _padded(lists: list[list[int]]) -> np.ndarray:
     most = max(map(len, lists))
     if not most:
         return np.zeros((len(lists), 0), dtype=np.int64)
-    return np.array([[*records, *[-1] * (most - len(records))] for records in lists], dtype=np.int64).reshape(len(lists), most)
+    return np.array([[*records, *[-1] * (most - len(records))] for records in lists], dtype=np.int64).reshape(
+        len(lists), most
+    )

@@ -9,7 +9,14 @@ class ProgramError(ValueError):
     expected      what should have stood there
     """
 
-    def __init__(self, message: str, line: int | None = None, column: int | None = None, token: str = "", expected: str = ""):
+    def __init__(
+        self,
+        message: str,
+        line: int | None = None,
+        column: int | None = None,
+        token: str = "",
+        expected: str = "",
+    ):
         self.line, self.column, self.token, self.expected = line, column, token, expected
         place = f"line {line}" if line else ""
         place += f", column {column}" if line and column else ""

@@ -25,7 +25,9 @@ def execute(program: Program, parameters: Float[Tensor, "*batch p"] | None = Non
         return execute_many([program])[0]
     wanted = program.parameter_count
     if parameters.ndim not in (1, 2) or parameters.shape[-1] != wanted:
-        raise ProgramError(f"parameters of shape {tuple(parameters.shape)}", expected=f"({wanted},) or (batch, {wanted})")
+        raise ProgramError(
+            f"parameters of shape {tuple(parameters.shape)}", expected=f"({wanted},) or (batch, {wanted})"
+        )
     shapes = _run([program], torch.atleast_2d(parameters))
     return shapes[0] if parameters.ndim == 1 else shapes
 

@@ -29,7 +29,9 @@ def grow(cuboid: Cuboids, still: Cuboids) -> Cuboids:
         return cuboid
     grown = _grow_apart(cuboid[rows], still[rows])
     return Cuboids(
-        cuboid.size.index_put((rows,), grown.size), cuboid.center.index_put((rows,), grown.center), cuboid.axes
+        cuboid.size.index_put((rows,), grown.size),
+        cuboid.center.index_put((rows,), grown.center),
+        cuboid.axes,
     )
 
 
@@ -43,12 +45,15 @@ def _meeting(a: Cuboids, b: Cuboids) -> Bool[Tensor, " rows"]:
 
     Spares most pairs the search over all samples; where it says False, that search decides.
     """
-    nearest = lambda box, point: box.world((box.local(point).clamp(0, 1) * (GRID - 1)).round() / (GRID - 1))
     goal = b.center
     for _ in range(4):
-        near = nearest(a, goal)
-        goal = nearest(b, near)
+        near = _nearest_sample(a, goal)
+        goal = _nearest_sample(b, near)
     return (near - goal).norm(dim=-1) < MEETING * _longest_side(a, b)
+
+
+def _nearest_sample(box: Cuboids, point: Float[Tensor, "rows 3"]) -> Float[Tensor, "rows 3"]:
+    return box.world((box.local(point).clamp(0, 1) * (GRID - 1)).round() / (GRID - 1))
 
 
 def _longest_side(a: Cuboids, b: Cuboids) -> Float[Tensor, " rows"]:
@@ -64,7 +69,9 @@ def _grow_apart(cuboid: Cuboids, still: Cuboids) -> Cuboids:
     step = (goal - near) / (2 * torch.where(lever == 0, torch.inf, lever))
     size = cuboid.size + torch.where(far & (step > 0), step, 0.0)
     grown = Cuboids(size, cuboid.center, cuboid.axes)
-    return Cuboids(size, torch.where(far, grown.center + opposite - grown.world(1 - q), cuboid.center), cuboid.axes)
+    return Cuboids(
+        size, torch.where(far, grown.center + opposite - grown.world(1 - q), cuboid.center), cuboid.axes
+    )
 
 
 def closest_samples(a: Cuboids, b: Cuboids) -> tuple[Float[Tensor, "rows 3"], Float[Tensor, "rows 3"]]:

@@ -7,7 +7,6 @@ batch at once, one level of the hierarchies at a time.
 
 from dataclasses import dataclass, field
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -77,21 +76,23 @@ def place(layout: Layout, state: Cuboids) -> Cuboids:
     Quirk: contents are scaled in size, componentwise and in their own axes, but their positions are not: it shows
     when attachments changed the size of a filled box.
     """
-    index = lambda numbers: torch.as_tensor(numbers, dtype=torch.long, device=state.size.device)
-    level, parent, flip = np.array(layout.level), np.array(layout.parent), np.array(layout.flip)
-    order = np.argsort(level, kind="stable")
-    position = np.argsort(order)  # where a box stands once sorted by level
-    row, bbox = index(layout.row), index(layout.bbox)
-    levels, first = [], 0
-    for depth in range(level.max() + 1):
-        boxes = order[first : first + (level == depth).sum()]
-        own = _mirrored(state[:, row[boxes]], index(flip[boxes]))
-        if depth:
-            within = levels[-1][:, index(position[parent[boxes]] - before)]
+    device = state.size.device
+    row, parent, bbox, flip, level = (
+        torch.tensor(numbers, device=device)
+        for numbers in (layout.row, layout.parent, layout.bbox, layout.flip, layout.level)
+    )
+    order = level.argsort(stable=True)
+    position = order.argsort()  # where a box stands once sorted by level
+    levels: list[Cuboids] = []
+    placed = 0  # boxes on all levels above the one above
+    for boxes in order.split(level.bincount().tolist()):
+        own = _mirrored(state[:, row[boxes]], flip[boxes])
+        if levels:
+            within = levels[-1][:, position[parent[boxes]] - placed]
             own = _inside(own, state.size[:, bbox[boxes]], within)
+            placed += levels[-1].size.shape[1]
         levels.append(own)
-        before, first = first, first + len(boxes)
-    return concatenate(levels, dim=1)[:, index(position)]
+    return concatenate(levels, dim=1)[:, position]
 
 
 def _mirrored(cuboids: Cuboids, flip: Tensor) -> Cuboids:

@@ -52,8 +52,8 @@ class Machine:
 
     def _written_points(self, rows: dict[str, Tensor], still: Cuboids) -> tuple[Tensor, Tensor]:
         """Attachment points as the program's text gives them."""
-        pick = lambda names: self.values[:, torch.stack([rows[name] for name in names], -1)].flatten(0, 1)
-        return pick(("x1", "y1", "z1")), pick(("x2", "y2", "z2"))
+        names = [rows[name] for name in ("x1", "y1", "z1", "x2", "y2", "z2")]
+        return self.values[:, torch.stack(names, -1)].flatten(0, 1).split(3, dim=-1)
 
     def _copied_points(self, rows: dict[str, Tensor], still: Cuboids) -> tuple[Tensor, Tensor]:
         """Attachment points of a clone: its source's, mirrored or shifted (paper, Appendix B).
@@ -65,13 +65,15 @@ class Machine:
         place = self._rows(rows["source"]).world(point)
         axis = torch.nn.functional.one_hot(rows["axis"], 3).to(place).repeat(len(self.values), 1)
         mirror = axis * rows["mirrored"].repeat(len(self.values))[:, None]
-        share = (rows["step"] / rows["steps"]).to(place)
+        share = rows["step"].to(place) / rows["steps"]
         distance = (self.values[:, rows["distance"]] * share).flatten()[:, None]
         shift = axis * self._rows(rows["bbox"]).size * distance
         place = place * (1 - 2 * mirror) + shift
         return point * (1 - 2 * mirror) + mirror, still.local(place).clamp(0, 1)
 
-    def _attach(self, group: Group, moved: Tensor, still: Cuboids, point: Tensor, still_point: Tensor, numbers: slice) -> None:
+    def _attach(
+        self, group: Group, moved: Tensor, still: Cuboids, point: Tensor, still_point: Tensor, numbers: slice
+    ) -> None:
         cuboid, target = self._rows(moved), still.world(still_point)
         if group.case == MOVE:
             result = move(cuboid, point, target)

@@ -17,10 +17,15 @@ def boxes_mesh(cuboids: Cuboids, colors: np.ndarray) -> trimesh.Trimesh:
     """One mesh with 8 corners and 12 triangles per box, in order; colors (n, 3) uint8. A side may be negative."""
     corners = cuboids.detach().corners().cpu().double().numpy()
     # An odd number of negative sides turns a box inside out: turn its triangles back.
-    inside_out = (np.linalg.det(cuboids.axes.detach().cpu().double().numpy()) * cuboids.size.detach().cpu().double().prod(-1).numpy()) < 0
+    inside_out = (
+        np.linalg.det(cuboids.axes.detach().cpu().double().numpy())
+        * cuboids.size.detach().cpu().double().prod(-1).numpy()
+    ) < 0
     triangles = np.where(inside_out[:, None, None], TRIANGLES[:, ::-1], TRIANGLES)
     faces = triangles + 8 * np.arange(len(corners))[:, None, None]
-    return trimesh.Trimesh(corners.reshape(-1, 3), faces.reshape(-1, 3), face_colors=np.repeat(colors, 12, 0), process=False)
+    return trimesh.Trimesh(
+        corners.reshape(-1, 3), faces.reshape(-1, 3), face_colors=np.repeat(colors, 12, 0), process=False
+    )
 
 
 def parts_scene(cuboids: Cuboids, colors: np.ndarray, names: list[str]) -> trimesh.Scene:
@@ -29,7 +34,9 @@ def parts_scene(cuboids: Cuboids, colors: np.ndarray, names: list[str]) -> trime
     for i, name in enumerate(names):
         part = boxes_mesh(cuboids[i : i + 1], colors[i : i + 1])
         part.visual = trimesh.visual.TextureVisuals(
-            material=trimesh.visual.material.PBRMaterial(baseColorFactor=[*colors[i], 255], metallicFactor=0.0, roughnessFactor=0.8)
+            material=trimesh.visual.material.PBRMaterial(
+                baseColorFactor=[*colors[i], 255], metallicFactor=0.0, roughnessFactor=0.8
+            )
         )
         scene.add_geometry(part, node_name=name, geom_name=name)
     return scene

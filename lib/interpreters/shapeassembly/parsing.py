@@ -5,7 +5,19 @@ import re
 from dataclasses import dataclass
 
 from .errors import ProgramError
-from .program import AXES, FACES, Attach, Block, Cuboid, Program, Reflect, Squeeze, Statement, Translate
+from .program import (
+    AXES,
+    FACES,
+    Attach,
+    Block,
+    Cuboid,
+    Number,
+    Program,
+    Reflect,
+    Squeeze,
+    Statement,
+    Translate,
+)
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -84,13 +96,17 @@ def _as_lines(text: str | bytes) -> list[str]:
         try:
             text = text.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            raise ProgramError(f"not a text: byte {error.start} is not UTF-8", expected="a program as text") from None
+            raise ProgramError(
+                f"not a text: byte {error.start} is not UTF-8", expected="a program as text"
+            ) from None
     if not isinstance(text, str):
         raise ProgramError(f"found {type(text).__name__}", expected="a program as text")
     lines = text.removeprefix("\ufeff").split("\n")
     for row, line in enumerate(lines):
         if "\0" in line:
-            raise ProgramError("not a text: a NUL character", row + 1, line.index("\0") + 1, "\0", "a program as text")
+            raise ProgramError(
+                "not a text: a NUL character", row + 1, line.index("\0") + 1, "\0", "a program as text"
+            )
     return lines
 
 
@@ -110,16 +126,26 @@ def _statement(line: str, row: int) -> Statement:
     target, command, body = match.groups()
     kinds = _ARGUMENTS.get(command)
     if kinds is None:
-        raise ProgramError(f"unknown statement {command!r}", row + 1, match.start(2) + 1, command, _STATEMENT_FORMS)
+        raise ProgramError(
+            f"unknown statement {command!r}", row + 1, match.start(2) + 1, command, _STATEMENT_FORMS
+        )
     if (target is not None) != (command == "Cuboid"):
         expected = "'NAME = Cuboid(…)'" if command == "Cuboid" else f"{command}(…) without a name and '='"
-        raise _error(line, row, target or command, f"{command} {'needs' if target is None else 'takes no'} name", expected)
+        raise _error(
+            line,
+            row,
+            target or command,
+            f"{command} {'needs' if target is None else 'takes no'} name",
+            expected,
+        )
     words = body.split(",") if body.strip() else []
     if command == "Cuboid" and len(words) == 3:
         words.append("False")  # the flag may be left out
     if len(words) != len(kinds):
         found = f"{command} with {len(words)} arguments"
-        raise ProgramError(found, row + 1, match.start(3) + 1, body.strip(), f"{len(kinds)}: {', '.join(kinds)}")
+        raise ProgramError(
+            found, row + 1, match.start(3) + 1, body.strip(), f"{len(kinds)}: {', '.join(kinds)}"
+        )
     values, column = [], match.start(3)
     for word, kind in zip(words, kinds):
         values.append(_READERS[kind](word.strip(), row, column + 1 + len(word) - len(word.lstrip())))
@@ -139,26 +165,32 @@ def _build(command: str, target: str, values: list) -> Statement:
     return Translate(*values[:3], (values[3],))
 
 
-def _number(word: str, row: int, column: int) -> float:
+def _number(word: str, row: int, column: int) -> Number:
     if _NUMBER.fullmatch(word):
         value = float(word)
         if math.isfinite(value):
             # A whole number stays one, so that the text comes back as it was written.
             return int(word) if word.isdigit() and abs(value) < 1e15 else value
         raise ProgramError(f"{word} is too large", row + 1, column, word, "a finite number")
-    raise ProgramError(f"{word!r} is not a number", row + 1, column, word, "a finite decimal number such as 0.5")
+    raise ProgramError(
+        f"{word!r} is not a number", row + 1, column, word, "a finite decimal number such as 0.5"
+    )
 
 
 def _count(word: str, row: int, column: int) -> int:
     if word.isdecimal() and word.isascii() and len(word) < 10 and int(word) >= 1:
         return int(word)
-    raise ProgramError(f"{word!r} is not a count", row + 1, column, word, "a whole number of copies, at least 1")
+    raise ProgramError(
+        f"{word!r} is not a count", row + 1, column, word, "a whole number of copies, at least 1"
+    )
 
 
 def _name(word: str, row: int, column: int) -> str:
     if _NAME.fullmatch(word):
         return word
-    raise ProgramError(f"{word!r} is not a name", row + 1, column, word, "the name of a cuboid, such as cube0")
+    raise ProgramError(
+        f"{word!r} is not a name", row + 1, column, word, "the name of a cuboid, such as cube0"
+    )
 
 
 def _one_of(choices: dict, what: str):
@@ -184,10 +216,14 @@ def _malformed(line: str, row: int) -> ProgramError:
     """A line that has not even the outline of a statement: say what is missing."""
     word = line.split()[0]
     if word == "Assembly":
-        return _error(line, row, word, "a new block begins before the last one is closed", "a closing brace '}'")
+        return _error(
+            line, row, word, "a new block begins before the last one is closed", "a closing brace '}'"
+        )
     if "(" in line and ")" not in line:
         return ProgramError("a parenthesis is never closed", row + 1, len(line.rstrip()) + 1, "", "')'")
-    return _error(line, row, word, f"found {line.strip()[:40]!r}", f"a statement: {_STATEMENT_FORMS}, or '}}'")
+    return _error(
+        line, row, word, f"found {line.strip()[:40]!r}", f"a statement: {_STATEMENT_FORMS}, or '}}'"
+    )
 
 
 def _error(line: str, row: int, token: str, message: str, expected: str) -> ProgramError:

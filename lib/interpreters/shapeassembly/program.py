@@ -24,6 +24,7 @@ from .errors import ProgramError
 AXES = ("X", "Y", "Z")
 FACES = ("right", "left", "top", "bot", "front", "back")
 BBOX = "bbox"
+Number = int | float  # a number stays as it was written: 1 is not turned into 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class Cuboid:
 
     command: ClassVar[str] = "Cuboid"
     name: str
-    numbers: tuple[float, float, float]
+    numbers: tuple[Number, Number, Number]
     aligned: bool = False
 
     def to_text(self) -> str:
@@ -50,7 +51,7 @@ class Attach:
     command: ClassVar[str] = "attach"
     moved: str
     still: str
-    numbers: tuple[float, float, float, float, float, float]
+    numbers: tuple[Number, Number, Number, Number, Number, Number]
 
     def to_text(self) -> str:
         return f"attach({_join(self.moved, self.still, *self.numbers)})"
@@ -69,7 +70,7 @@ class Squeeze:
     first: str
     second: str
     face: str
-    numbers: tuple[float, float]
+    numbers: tuple[Number, Number]
 
     def to_text(self) -> str:
         return f"squeeze({_join(self.moved, self.first, self.second, self.face, *self.numbers)})"
@@ -104,7 +105,7 @@ class Translate:
     source: str
     axis: str
     count: int
-    numbers: tuple[float]
+    numbers: tuple[Number]
 
     def to_text(self) -> str:
         return f"translate({_join(self.source, self.axis, self.count, *self.numbers)})"
@@ -181,14 +182,21 @@ class Program:
         """The same structure with other numbers, (p,). Raises ProgramError for a wrong count or bad numbers."""
         numbers = torch.as_tensor(parameters, dtype=torch.float64).detach().flatten().tolist()
         if len(numbers) != self.parameter_count:
-            raise ProgramError(f"{len(numbers)} parameters given", expected=f"{self.parameter_count} for this program")
+            raise ProgramError(
+                f"{len(numbers)} parameters given", expected=f"{self.parameter_count} for this program"
+            )
         rest = iter(numbers)
-        return Program(tuple(
-            replace(block, statements=tuple(
-                replace(s, numbers=tuple(next(rest) for _ in s.numbers)) for s in block.statements
-            ))
-            for block in self.blocks
-        ))
+        return Program(
+            tuple(
+                replace(
+                    block,
+                    statements=tuple(
+                        replace(s, numbers=tuple(next(rest) for _ in s.numbers)) for s in block.statements
+                    ),
+                )
+                for block in self.blocks
+            )
+        )
 
     @property
     def structure(self) -> tuple:

@@ -35,7 +35,9 @@ def _draw(rng: np.random.Generator) -> Program:
     return Program(tuple(blocks))
 
 
-def _block(rng: np.random.Generator, name: str, size: tuple, names: Iterator[str]) -> tuple[Block, list[Cuboid]]:
+def _block(
+    rng: np.random.Generator, name: str, size: tuple, names: Iterator[str]
+) -> tuple[Block, list[Cuboid]]:
     """A block of a given size, and those of its cuboids that other blocks must fill."""
     cuboids, filled = [], []
     for number in range(rng.integers(1, 5)):
@@ -57,7 +59,9 @@ def _connections(rng: np.random.Generator, cuboid: Cuboid, grounded: list[str]) 
     """One squeeze, or one or two attaches, between a new cuboid and those that stand already."""
     first, second = rng.choice(grounded, 2)
     if rng.random() < 0.35:
-        face = str(rng.choice(["top", "bot", "left", "right", "front", "back"], p=[0.5, 0.2, 0.1, 0.1, 0.05, 0.05]))
+        face = str(
+            rng.choice(["top", "bot", "left", "right", "front", "back"], p=[0.5, 0.2, 0.1, 0.1, 0.05, 0.05])
+        )
         return [Squeeze(cuboid.name, str(first), str(second), face, _numbers(rng, 2, 0.1, 0.9))]
     start, end = (0.5, 0.0, 0.5), (0.5, 1.0, 0.5)
     base = 0.0 if first == BBOX else 1.0

@@ -66,7 +66,9 @@ class Shape:
 
         parts = [self._layout.part[self._first + i] for i in self._leaves]
         number = {part: k for k, part in enumerate(dict.fromkeys(parts))}
-        return np.array([PALETTE[number[part] % len(PALETTE)] for part in parts], dtype=np.uint8).reshape(-1, 3)
+        return np.array([PALETTE[number[part] % len(PALETTE)] for part in parts], dtype=np.uint8).reshape(
+            -1, 3
+        )
 
     def bounds(self) -> Float[Tensor, "2 3"]:
         """Smallest and largest coordinates of the leaves."""

@@ -1,0 +1,82 @@
+"""Figures about gradients: bars by parameter, loss curves, a fit against its target."""
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from torch import Tensor
+
+from lib.interpreters.shapeassembly import Program
+from lib.viewing.camera import Camera
+from lib.viewing.figure import bounds_of, draw, draw_points
+
+_COMMAND_COLORS = {"Cuboid": "#5e8bba", "attach": "#e28f4f", "squeeze": "#70ad77", "translate": "#9379b8"}
+
+
+def gradient_bars(program: Program, gradient: Tensor, dots: Tensor | None = None, title: str = "") -> Figure:
+    """One bar per parameter in text order, coloured by its statement; optional dots of another estimate, (p,) both."""
+    commands = [name.split(":")[2] for name in program.parameter_names()]
+    figure, ax = _axes(7.5, 2.6)
+    place = np.arange(len(commands))
+    ax.bar(place, gradient.detach().numpy(), color=[_COMMAND_COLORS[c] for c in commands], width=0.9)
+    for command in dict.fromkeys(commands):
+        ax.bar([0], [0], color=_COMMAND_COLORS[command], label=command)
+    if dots is not None:
+        ax.scatter(place, dots.detach().numpy(), s=9, color="#1b1f27", zorder=3)
+    ax.axhline(0, color="#5b6475", linewidth=0.8)
+    ax.set(xlabel="number in the program's text", title=title)
+    ax.legend(fontsize=8, frameon=False, ncols=4)
+    return _finished(figure)
+
+
+def loss_curves(
+    losses: Mapping[str, Tensor], floor: float | None = None, title: str = "Chamfer distance"
+) -> Figure:
+    """Loss by step for each named run; `floor` is drawn as a dashed line."""
+    figure, ax = _axes(5.2, 2.8)
+    for name, values in losses.items():
+        ax.plot(values.detach().numpy(), label=name, linewidth=1.6)
+    if floor is not None:
+        ax.axhline(floor, color="#5b6475", linestyle="--", linewidth=1, label="two samples of the target")
+    ax.set(xlabel="step", title=title, ylim=(0, None))
+    ax.legend(fontsize=8, frameon=False)
+    return _finished(figure)
+
+
+def plot_against(values: Tensor, results: Mapping[str, Tensor], xlabel: str, title: str) -> Figure:
+    """Curves over one number, (n,) each."""
+    figure, ax = _axes(5.2, 2.8)
+    for name, result in results.items():
+        ax.plot(values.detach().numpy(), result.detach().numpy(), label=name, linewidth=1.6)
+    ax.set(xlabel=xlabel, title=title)
+    ax.legend(fontsize=8, frameon=False)
+    return _finished(figure)
+
+
+def draw_fit(shapes: Sequence, titles: Sequence[str], target: Tensor) -> Figure:
+    """Shapes under one camera with the target's points (m, 3) over them, then the target alone."""
+    points = target.detach().numpy()
+    camera = Camera(bounds=bounds_of(*shapes, points))
+    figure, axes = plt.subplots(1, len(shapes) + 1, figsize=(2.2 * (len(shapes) + 1), 2.5), dpi=100)
+    plt.close(figure)
+    for ax, shape, title in zip(axes, shapes, titles, strict=False):
+        draw(ax, shape, camera=camera)
+        draw_points(ax, points, camera=camera, color="#d62839", size=1.5)
+        ax.set_xlabel(title, fontsize=9)
+    draw_points(axes[-1], points, camera=camera, size=3)
+    axes[-1].set_xlabel("the target", fontsize=9)
+    figure.subplots_adjust(0, 0.1, 1, 1, 0.02, 0)
+    return figure
+
+
+def _axes(width: float, height: float):
+    figure, ax = plt.subplots(figsize=(width, height), dpi=100)
+    plt.close(figure)
+    ax.spines[["top", "right"]].set_visible(False)
+    return figure, ax
+
+
+def _finished(figure: Figure) -> Figure:
+    figure.tight_layout()
+    return figure

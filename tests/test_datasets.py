@@ -1,0 +1,158 @@
+"""lib.datasets: real programs where they were fetched, embedded ones elsewhere, and errors that name the place."""
+
+import numpy as np
+import pytest
+import torch
+
+from data_scripts import fetch_shapeassembly as fetching
+from lib import datasets
+from lib.datasets import CATEGORIES, DataError, shapeassembly
+from lib.interpreters.shapeassembly import execute, parse
+
+TEXT = """Assembly Program_0 {
+\tbbox = Cuboid(1.0, 2.0, 1.0, True)
+\tcube0 = Cuboid(1.0, 0.5, 1.0, True)
+\tcube1 = Cuboid(0.1, 1.5, 0.1, True)
+\tattach(cube0, bbox, 0.5, 1.0, 0.5, 0.5, 1.0, 0.5)
+\tsqueeze(cube1, bbox, cube0, bot, 0.1, 0.1)
+\treflect(cube1, X)
+}
+"""
+
+
+@pytest.fixture
+def no_real_data(tmp_path, monkeypatch):
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path / "nothing"))
+
+
+@pytest.fixture
+def real_data(tmp_path, monkeypatch):
+    """A folder as the fetch script leaves it, with three programs a category."""
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path))
+    folder = tmp_path / "shapeassembly"
+    for category in CATEGORIES:
+        (folder / category).mkdir(parents=True)
+        (folder / "splits" / category).mkdir(parents=True)
+        number = CATEGORIES.index(category) + 1
+        for i in (3, 1, 2):
+            (folder / category / f"{number}{i}.txt").write_text(TEXT)
+        (folder / "splits" / category / "train.txt").write_text(f"{number}3\n{number}1\n")
+        (folder / "splits" / category / "val.txt").write_text(f"{number}2\n")
+    return folder
+
+
+# ---- embedded ----
+
+
+@pytest.mark.parametrize("category", [*CATEGORIES, None])
+@pytest.mark.parametrize("split", ["train", "val", None])
+def test_embedded_sets_have_their_sizes(no_real_data, category, split):
+    programs = shapeassembly(category, split)
+    per_category = sum(size for name, size in datasets.EMBEDDED_SIZES.items() if split in (name, None))
+    assert len(programs) == len(set(programs.ids)) == per_category * (1 if category else 3)
+    assert programs.source == "embedded"
+    assert "embedded" in programs.describe() and "fetch" in programs.describe()
+
+
+def test_embedded_programs_run_and_are_the_same_every_time(no_real_data):
+    first = shapeassembly(split="val")
+    texts = [program.to_text() for program in first]
+    datasets._embedded.cache_clear()
+    assert texts == [program.to_text() for program in shapeassembly(split="val")]
+    assert all(len(execute(program).cuboids) > 1 for program in first)
+
+
+def test_train_and_val_share_no_program(no_real_data):
+    train = {program.to_text() for program in shapeassembly(split="train")}
+    assert not train & {program.to_text() for program in shapeassembly(split="val")}
+
+
+def test_a_variation_keeps_structure_and_equal_widths():
+    program = parse(TEXT)
+    other = datasets.vary(program, np.random.default_rng(0))
+    assert other.structure == program.structure
+    ratio = other.parameters() / program.parameters()
+    sizes = [i for i, name in enumerate(program.parameter_names()) if ":Cuboid:" in name]
+    by_axis = ratio[sizes].reshape(-1, 3)
+    assert by_axis.std(dim=0).max() < 1e-3  # sizes are rounded to 4 decimals
+    low, high = datasets.SCALE_RANGE
+    assert ((low - 1e-3 < by_axis) & (by_axis < high + 1e-3)).all()
+    rest = torch.ones(len(ratio), dtype=torch.bool)
+    rest[sizes] = False
+    assert torch.equal(other.parameters()[rest], program.parameters()[rest])
+
+
+def test_examples_have_a_first_line_that_describes_them():
+    names = list(datasets.examples())
+    assert names == sorted(names) and len(names) >= 12
+    for name in names:
+        text = datasets.example_text(name)
+        assert text.startswith("# ") and parse(text) == datasets.example(name)
+
+
+# ---- real ----
+
+
+def test_real_programs_come_in_the_order_of_their_list(real_data):
+    train = shapeassembly("table", "train")
+    assert train.ids == ("23", "21") and train.source == "real"
+    assert list(train) == [parse(TEXT)] * 2
+    assert train.describe() == "2 real table train programs of the ShapeAssembly data set."
+    assert shapeassembly("table").ids == ("23", "21", "22")
+    assert len(shapeassembly()) == 9
+
+
+def test_a_slice_is_a_set_and_an_index_is_a_program(real_data):
+    programs = shapeassembly("chair")
+    assert programs[:2].ids == programs.ids[:2] and programs[:2].source == "real"
+    assert programs[-1] == parse(TEXT) and parse(TEXT) in programs
+    with pytest.raises(IndexError):
+        programs[3]
+
+
+def test_unknown_names_are_answered_with_the_choices(no_real_data):
+    with pytest.raises(DataError, match="'sofa'.*chair, table, storage"):
+        shapeassembly("sofa")
+    with pytest.raises(DataError, match="'test'.*train, val"):
+        shapeassembly("chair", "test")
+    with pytest.raises(DataError, match="unknown example 'spaceship': choose one of .*chair"):
+        datasets.example("spaceship")
+
+
+def test_a_corrupt_program_is_named_with_its_line(real_data):
+    (real_data / "chair" / "13.txt").write_text(TEXT.replace("0.5, 1.0, True", "0.5, oops, True"))
+    programs = shapeassembly("chair")
+    assert programs[1] == parse(TEXT)  # the others still load
+    with pytest.raises(DataError, match=r"chair/13\.txt.*line 3"):
+        programs[0]
+
+
+def test_a_program_that_is_not_text_is_named(real_data):
+    (real_data / "chair" / "13.txt").write_bytes(TEXT.encode()[:60] + b"\xff\xfe")
+    with pytest.raises(DataError, match=r"chair/13\.txt.*line 3.*text"):
+        shapeassembly("chair")[0]
+
+
+def test_a_missing_program_is_named_with_the_list_and_line(real_data):
+    (real_data / "chair" / "11.txt").unlink()
+    with pytest.raises(DataError, match=r"splits/chair/train\.txt, line 2: .*chair/11\.txt.*fetch"):
+        shapeassembly("chair", "train")
+
+
+def test_a_missing_list_is_named(real_data):
+    (real_data / "splits" / "chair" / "val.txt").unlink()
+    with pytest.raises(DataError, match=r"splits/chair/val\.txt.*fetch"):
+        shapeassembly("chair")
+
+
+def test_the_real_data_set(shared, tmp_path, monkeypatch):
+    archive = shared / "data" / "shapeassembly-programs.tar.xz"
+    if not archive.exists():
+        pytest.skip(f"there is no {archive}")
+    fetching.fetch(tmp_path, archive)
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path))
+    assert [len(shapeassembly(category, "train")) for category in CATEGORIES] == [3339, 5762, 1435]
+    assert [len(shapeassembly(category, "val")) for category in CATEGORIES] == [496, 774, 116]
+    assert len(shapeassembly()) == 11_922
+    chair = shapeassembly("chair", "val")[0]
+    assert parse(chair.to_text()) == chair

@@ -28,6 +28,7 @@ test: $(STAMP) ## every test: programs, notebooks, style, browser
 bench: $(STAMP) ## how fast is it? prints a table, keeps build/bench.json
 	@mkdir -p build
 	$(PY) -m pytest -q -o addopts= tests/bench_*.py --benchmark-only --benchmark-json=build/bench.json
+	@$(PY) -m tests.bench_report build/bench.json
 
 refresh: $(STAMP) ## execute the notebooks again in place (embedded data), cleaned for git
 	SHAPE_PROGRAMS_DATA=build/no-data $(PY) -m nbconvert --to notebook --execute --inplace $(CHAPTERS)

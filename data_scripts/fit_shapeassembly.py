@@ -53,8 +53,10 @@ def fit_all(options: argparse.Namespace) -> list[dict]:
     rows = _read(options.out, settings)
     done = {row["id"] for row in rows}
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    with options.out.open("w") as file:
-        file.writelines(json.dumps(line) + "\n" for line in [settings, *rows])
+    part = options.out.with_name(options.out.name + ".part")  # whole lines only, whatever the last run left
+    part.write_text("".join(json.dumps(line) + "\n" for line in [settings, *rows]))
+    part.replace(options.out)
+    with options.out.open("a") as file:
         for name in tqdm([name for name in programs.ids if name not in done], desc="programs"):
             try:
                 row = fit_one(

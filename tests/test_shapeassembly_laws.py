@@ -155,6 +155,11 @@ def test_a_batch_of_parameters_equals_each_alone(programs):
             assert difference(together[i].boxes, execute(program.with_parameters(numbers)).boxes) == 0
 
 
+def test_an_empty_batch_is_empty(programs):
+    assert len(execute_many([])) == 0
+    assert len(execute(programs[0], programs[0].parameters().repeat(0, 1))) == 0
+
+
 def test_a_broken_shape_does_not_stop_the_others(programs, shapes):
     program, shape = programs[0], shapes[0]
     batch = program.parameters().repeat(3, 1)

@@ -63,7 +63,7 @@ def draw(
     ghost: Cuboids | None = None,
     points: ArrayLike | Mapping[str, ArrayLike] | None = None,
     arrows: Sequence[tuple] = (),
-    labels: Mapping[str, Sequence[float]] | Sequence[tuple] = (),
+    labels: Mapping[str, Sequence] | Sequence[tuple] = (),
     opacity: float = 1.0,
     shadow: bool = True,
 ) -> Camera:
@@ -140,7 +140,7 @@ def draw_points(
 
 
 def show(
-    shapes: Sequence,
+    shapes,
     titles: Sequence[str] | None = None,
     *,
     columns: int | None = None,

@@ -20,6 +20,7 @@ from ..cuboids import Cuboids, cross
 CLOSE_ENOUGH = 1e-4  # one earlier attachment: nearer than this counts as attached
 ON_TARGET = 0.01  # two or more: nearer than this counts as attached, on a line, or turned the right way
 FACING = 0.9  # cosine below which a face does not look at the target: 25.8 degrees (the paper says 25)
+NEARLY_ZERO = 1e-6  # a point this near to the hinge lies on it: the TINY divisors leave about 1e-8
 TINY = 1e-8  # added to divisors, as the data set's own interpreter does
 LARGEST_CHANGE = 1e8  # a solution for a size that is larger than this counts as none
 _SIZE_ORDER = (1, 2, 0)  # height, width, length: the order in which axes are tried; the first of equals wins
@@ -152,7 +153,8 @@ def _orient(cuboid: Cuboids, point: Points, target: Points, fixed_points: Tensor
     now, wanted = source - pivot, _project(target, source, line) - pivot
     scale, _ = _reach(now, now, _square(wanted))  # compare directions only: give both the same length
     now = now * (1 + scale).unsqueeze(-1)
-    still = (_length(now) == 0) | (_length(wanted) == 0) | (_length(now - wanted) < ON_TARGET)
+    nothing = (_length(now) < NEARLY_ZERO) | (_length(wanted) < NEARLY_ZERO)
+    still = nothing | (_length(now - wanted) < ON_TARGET)
     u, v = _unit(now), _unit(wanted)
     turn = _turn_about(line, u, v)
     missed = _length((turn @ u.unsqueeze(-1)).squeeze(-1) - v) > ON_TARGET

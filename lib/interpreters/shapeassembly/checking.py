@@ -1,165 +1,237 @@
 """Does a program make sense? Everything that can be wrong with a readable program, checked before it runs."""
 
-import math
+import sys
+from dataclasses import dataclass, field
 
-from .parsing import Source
-from .program import BBOX, Attach, Block, Cuboid, Reflect, Squeeze, Translate
+from .errors import ProgramError, quoted
+from .parsing import Source, is_name
+from .program import AXES, BBOX, FACES, Attach, Block, Cuboid, Reflect, Squeeze, Statement, Translate
 
-MAX_CUBOIDS = 10_000  # executed boxes; far above any furniture (the largest real program has 51 leaves)
+# Limits far above any furniture (the largest real program: 51 leaves, 3 levels, 2 attaches that move one cuboid).
+# They keep a short text from asking for hours of work.
+MAX_CUBOIDS = 10_000  # executed boxes
+MAX_LEVELS = 100  # blocks within blocks
+MAX_MOVES = 100  # attaches that move one cuboid
+MAX_COPIED_MOVES = 100_000  # attaches that the copies of one block repeat
+
 _PHASE = {Cuboid: 0, Attach: 1, Squeeze: 1, Reflect: 2, Translate: 2}
+_NUMBERS = {Cuboid: 3, Attach: 6, Squeeze: 2, Reflect: 0, Translate: 1}
 
 
 def check(blocks: tuple[Block, ...], source: Source | None = None) -> None:
-    """Raise ProgramError for the first thing that is wrong with `blocks`."""
+    """Raise ProgramError for the first thing that is wrong with `blocks`; `source` tells where their text stands."""
     source = source or Source.printed(blocks)
-    names = [block.name for block in blocks]
-    for b, block in enumerate(blocks):
-        if names.index(block.name) != b:
-            raise source.error(b, -1, block.name, f"block {block.name!r} is defined twice", "a new name")
-        _check_block(b, block, source, set(names))
+    if not blocks:
+        raise ProgramError("a program without blocks", expected="at least one block")
+    names = {block.name for block in blocks}
+    seen: set[str] = set()
+    for number, block in enumerate(blocks):
+        if not is_name(block.name):
+            raise source.error(
+                number, -1, "", f"{quoted(str(block.name))} is not a name", "one such as Program_0"
+            )
+        if block.name in seen:
+            raise source.error(
+                number, -1, block.name, f"block {quoted(block.name)} is defined twice", "a new name"
+            )
+        seen.add(block.name)
+        _BlockCheck(number, block, source, names).run()
     _check_hierarchy(blocks, source)
 
 
-def _check_block(b: int, block: Block, source: Source, block_names: set[str]) -> None:
-    declared: dict[str, int] = {}
-    grounded = {BBOX}
-    phase = 0
-    if not block.statements or getattr(block.statements[0], "name", None) != BBOX:
-        raise source.error(b, 0 if block.statements else -1, "", f"block {block.name!r} has no bounding box",
-                           "'bbox = Cuboid(…)' as its first statement")  # fmt: skip
-    for s, statement in enumerate(block.statements):
-        if _PHASE[type(statement)] < phase:
-            raise source.error(b, s, statement.command, f"{statement.command} out of order",
-                               "first Cuboid, then attach and squeeze, then reflect and translate")  # fmt: skip
-        phase = _PHASE[type(statement)]
-        _check_numbers(b, s, statement, source)
-        if phase == 0:
-            _check_cuboid(b, s, statement, source, declared, block_names)
-            declared[statement.name] = s
-        else:
-            _check_names(b, s, statement, source, declared, grounded)
-        if phase == 1:
-            grounded.add(statement.moved)
-    _check_clone_names(b, block, source, declared)
+def check_block(block: Block) -> None:
+    """The same for one block by itself; whether other blocks fill its boxes is not asked."""
+    names = {statement.name for statement in block.statements if isinstance(statement, Cuboid)}
+    _BlockCheck(0, block, Source.printed((block,)), names).run()
 
 
-def _check_numbers(b, s, statement, source) -> None:
-    for number in statement.numbers:
-        if not math.isfinite(number):
-            raise source.error(b, s, str(number), f"{number} is not finite", "a finite number")
-        if isinstance(statement, Cuboid) and number <= 0:
-            raise source.error(
-                b, s, str(number), f"{statement.name} has a side of {number}", "a size above 0"
-            )
-
-
-def _check_cuboid(b, s, cuboid, source, declared, block_names) -> None:
-    if cuboid.name in declared:
-        raise source.error(
-            b, s, cuboid.name, f"{cuboid.name!r} is declared twice in this block", "a new name"
-        )
-    if cuboid.name.startswith("Program_") and cuboid.name not in block_names:
-        raise source.error(
-            b, s, cuboid.name, f"no block fills {cuboid.name!r}", f"'Assembly {cuboid.name} {{'"
-        )
-    if len(declared) >= MAX_CUBOIDS:
-        raise source.error(b, s, cuboid.name, "too many cuboids", f"at most {MAX_CUBOIDS}")
-
-
-def _check_names(b, s, statement, source, declared, grounded) -> None:
-    """Every cuboid named must be declared; all but the one being moved must already stand on something."""
-    moving = isinstance(statement, Attach | Squeeze)
-    if moving and statement.moved == BBOX:
-        raise source.error(b, s, BBOX, "the bounding box cannot be moved", "another cuboid")
-    partners = _partners(statement)
-    for name in (statement.moved, *partners) if moving else partners:
-        if name not in declared:
-            raise source.error(b, s, name, f"unknown cuboid {name!r}", "a cuboid declared in this block")
-    for name in partners:
-        if name not in grounded or (moving and name == statement.moved):
-            what = (
-                "attached to itself" if moving and name == statement.moved else "not attached to anything yet"
-            )
-            raise source.error(
-                b, s, name, f"{name!r} is {what}", "a cuboid that is connected to the bounding box"
-            )
-    if not moving and statement.source == BBOX:
-        raise source.error(b, s, BBOX, "the bounding box cannot be copied", "another cuboid")
-
-
-def _partners(statement) -> tuple[str, ...]:
-    if isinstance(statement, Attach):
-        return (statement.still,)
-    if isinstance(statement, Squeeze):
-        return (statement.first, statement.second)
-    return (statement.source,)
-
-
-def clone_count(statement) -> int:
+def clone_count(statement: Statement) -> int:
     """How many boxes a statement of the last part of a block adds."""
     return statement.count if isinstance(statement, Translate) else int(isinstance(statement, Reflect))
 
 
-def _check_clone_names(b, block, source, declared) -> None:
-    """Clones are called cube<number of cuboids so far>; no declared cuboid may bear such a name already."""
-    count = len(declared) - 1
-    for s, statement in enumerate(block.statements):
-        copies = clone_count(statement)
-        if count + copies > MAX_CUBOIDS:
-            raise source.error(
-                b, s, str(copies), f"{copies} copies make too many cuboids", f"at most {MAX_CUBOIDS}"
+def is_finite(number: object) -> bool:
+    """Is it a number that a float can hold?"""
+    return isinstance(number, int | float) and abs(number) <= sys.float_info.max
+
+
+@dataclass
+class _BlockCheck:
+    """One block, read from top to bottom: what is declared, what stands on something, how often each was moved."""
+
+    number: int
+    block: Block
+    source: Source
+    block_names: set[str]
+    declared: dict[str, int] = field(default_factory=dict)  # name -> statement
+    grounded: set[str] = field(default_factory=lambda: {BBOX})
+    moves: dict[str, int] = field(default_factory=dict)
+    phase: int = 0
+
+    def run(self) -> None:
+        first = self.block.statements[0] if self.block.statements else None
+        if not isinstance(first, Cuboid) or first.name != BBOX:
+            at, expected = (0 if first else -1), "'bbox = Cuboid(…)' as its first statement"
+            raise self.error(at, "", f"block {quoted(self.block.name)} has no bounding box", expected)
+        for at, statement in enumerate(self.block.statements):
+            self.order(at, statement)
+            self.form(at, statement)
+            if isinstance(statement, Cuboid):
+                self.cuboid(at, statement)
+            elif isinstance(statement, Attach | Squeeze):
+                self.attachment(at, statement)
+            else:
+                self.copy(at, statement)
+        self.clone_names()
+
+    def error(self, at: int, token: str, message: str, expected: str) -> ProgramError:
+        return self.source.error(self.number, at, token, message, expected)
+
+    def order(self, at: int, statement: Statement) -> None:
+        if _PHASE[type(statement)] < self.phase:
+            expected = "first Cuboid, then attach and squeeze, then reflect and translate"
+            raise self.error(at, statement.command, f"{statement.command} out of order", expected)
+        self.phase = _PHASE[type(statement)]
+
+    def form(self, at: int, statement: Statement) -> None:
+        """Arguments of the right number and range: of what is parsed only the numbers can be wrong here."""
+        command = statement.command
+        if len(statement.numbers) != _NUMBERS[type(statement)]:
+            found = f"{command} with {len(statement.numbers)} numbers"
+            raise self.error(at, command, found, f"{_NUMBERS[type(statement)]}")
+        for number in statement.numbers:
+            if not is_finite(number):
+                raise self.error(at, str(number), f"{str(number)[:40]} is not finite", "a finite number")
+            if isinstance(statement, Cuboid) and number <= 0:
+                found = f"{quoted(statement.name)} has a side of {number}"
+                raise self.error(at, str(number), found, "a size above 0")
+        if isinstance(statement, Squeeze) and statement.face not in FACES:
+            raise self.error(
+                at, statement.face, f"{quoted(statement.face)} is not a face", " or ".join(FACES)
             )
-        for number in range(count, count + copies):
-            if f"cube{number}" in declared:
-                raise source.error(b, declared[f"cube{number}"], f"cube{number}",
-                                   f"cube{number} is the name the copies of {statement.source!r} will take",
-                                   "names cube0, cube1, … in order")  # fmt: skip
-        count += copies
+        if isinstance(statement, Reflect | Translate) and statement.axis not in AXES:
+            raise self.error(
+                at, statement.axis, f"{quoted(statement.axis)} is not an axis", " or ".join(AXES)
+            )
+        if isinstance(statement, Translate) and not (
+            isinstance(statement.count, int) and statement.count >= 1
+        ):
+            raise self.error(
+                at, str(statement.count), f"{statement.count} copies", "a whole number, at least 1"
+            )
+
+    def cuboid(self, at: int, cuboid: Cuboid) -> None:
+        name = cuboid.name
+        if not is_name(name):
+            raise self.error(at, "", f"{quoted(str(name))} is not a name", "one such as cube0")
+        if name in self.declared:
+            raise self.error(at, name, f"{quoted(name)} is declared twice in this block", "a new name")
+        if name.startswith("Program_") and name not in self.block_names:
+            raise self.error(at, name, f"no block fills {quoted(name)}", f"'Assembly {name} {{'")
+        if len(self.declared) > MAX_CUBOIDS:
+            raise self.error(at, name, "too many cuboids", f"at most {MAX_CUBOIDS}")
+        self.declared[name] = at
+
+    def attachment(self, at: int, statement: Attach | Squeeze) -> None:
+        moved = statement.moved
+        if moved == BBOX:
+            raise self.error(at, BBOX, "the bounding box cannot be moved", "another cuboid")
+        partners = (
+            (statement.still,) if isinstance(statement, Attach) else (statement.first, statement.second)
+        )
+        for name in (moved, *partners):
+            self.known(at, name)
+        for name in partners:
+            if name == moved:
+                raise self.error(at, name, f"{quoted(name)} is attached to itself", "another cuboid")
+            self.standing(at, name)
+        self.grounded.add(moved)
+        self.moves[moved] = self.moves.get(moved, 0) + len(partners)
+        if self.moves[moved] > MAX_MOVES:
+            raise self.error(at, moved, f"too many attaches move {quoted(moved)}", f"at most {MAX_MOVES}")
+
+    def copy(self, at: int, statement: Reflect | Translate) -> None:
+        if statement.source == BBOX:
+            raise self.error(at, BBOX, "the bounding box cannot be copied", "another cuboid")
+        self.known(at, statement.source)
+        self.standing(at, statement.source)
+
+    def known(self, at: int, name: str) -> None:
+        if name not in self.declared:
+            raise self.error(at, name, f"unknown cuboid {quoted(name)}", "a cuboid declared in this block")
+
+    def standing(self, at: int, name: str) -> None:
+        if name not in self.grounded:
+            expected = "a cuboid that is connected to the bounding box"
+            raise self.error(at, name, f"{quoted(name)} is not attached to anything yet", expected)
+
+    def clone_names(self) -> None:
+        """Clones are called cube<number of cuboids so far>: no declared cuboid may bear such a name already."""
+        count, repeated = len(self.declared) - 1, 0
+        for at, statement in enumerate(self.block.statements):
+            if not (copies := clone_count(statement)):
+                continue
+            repeated += copies * self.moves[statement.source]
+            if count + copies > MAX_CUBOIDS:
+                found = f"{copies} copies make too many cuboids"
+                raise self.error(at, str(copies), found, f"at most {MAX_CUBOIDS}")
+            if repeated > MAX_COPIED_MOVES:
+                found = f"the copies repeat {repeated} attaches"
+                raise self.error(at, statement.command, found, f"at most {MAX_COPIED_MOVES}")
+            for name in (f"cube{number}" for number in range(count, count + copies)):
+                if name in self.declared:
+                    found = f"{name} is the name the copies of {quoted(statement.source)} will take"
+                    raise self.error(self.declared[name], name, found, "names cube0, cube1, … in order")
+            count += copies
 
 
 def _check_hierarchy(blocks: tuple[Block, ...], source: Source) -> None:
-    """The root reaches every block, no block contains itself, and the whole stays below MAX_CUBOIDS boxes."""
-    index = {block.name: b for b, block in enumerate(blocks)}
-    boxes: dict[str, int] = {}  # executed boxes inside each finished block
-    open_blocks: list[tuple[str, list[tuple[int, str, int]]]] = [
-        (blocks[0].name, _children(blocks[0], index))
-    ]
-    path = [blocks[0].name]
-    while open_blocks:
-        name, waiting = open_blocks[-1]
-        if waiting:
-            s, child, _ = waiting.pop()
-            if child in path:
-                raise source.error(index[name], s, child, f"block {child!r} contains itself", "no recursion")
-            if child not in boxes:
-                open_blocks.append((child, _children(blocks[index[child]], index)))
-                path.append(child)
+    """The root reaches every block, no block contains itself, and the whole stays below the limits."""
+    index = {block.name: number for number, block in enumerate(blocks)}
+    children = [_children(block, index) for block in blocks]
+    boxes: dict[int, int] = {}  # finished block -> executed boxes inside it
+    path = [0]  # from the root to the block that is being counted
+    waiting = [list(children[0])]
+    while path:
+        if not waiting[-1]:
+            _count_boxes(path[-1], blocks, children, boxes, source)
+            path.pop()
+            waiting.pop()
             continue
-        block = blocks[index[name]]
-        inside = _children(block, index)
-        own = len(_cuboids(block)) - 1 + sum(map(clone_count, block.statements))
-        boxes[name] = own + sum(copies * boxes[child] for _, child, copies in inside)
-        if boxes[name] > MAX_CUBOIDS:
+        at, child, _ = waiting[-1].pop(0)
+        name = blocks[child].name
+        if child in path:
+            raise source.error(path[-1], at, name, f"block {quoted(name)} contains itself", "no recursion")
+        if len(path) >= MAX_LEVELS:
             raise source.error(
-                index[name], -1, name, f"block {name!r} makes {boxes[name]} cuboids", f"at most {MAX_CUBOIDS}"
+                path[-1], at, name, "too many blocks within blocks", f"at most {MAX_LEVELS} levels"
             )
-        open_blocks.pop()
-        path.pop()
-    for b, block in enumerate(blocks):
-        if block.name not in boxes:
-            raise source.error(
-                b, -1, block.name, f"block {block.name!r} is never used", "a cuboid of that name"
-            )
+        if child not in boxes:
+            path.append(child)
+            waiting.append(list(children[child]))
+    for number, block in enumerate(blocks):
+        if number not in boxes:
+            found = f"block {quoted(block.name)} is never used"
+            raise source.error(number, -1, block.name, found, "a cuboid of that name")
 
 
-def _cuboids(block: Block) -> list[Cuboid]:
-    return [s for s in block.statements if isinstance(s, Cuboid)]
+def _count_boxes(number: int, blocks, children, boxes: dict[int, int], source: Source) -> None:
+    block = blocks[number]
+    declared = sum(isinstance(statement, Cuboid) for statement in block.statements) - 1
+    own = declared + sum(map(clone_count, block.statements))
+    boxes[number] = own + sum(copies * boxes[child] for _, child, copies in children[number])
+    if boxes[number] > MAX_CUBOIDS:
+        found = f"block {quoted(block.name)} makes {boxes[number]} cuboids"
+        raise source.error(number, -1, block.name, found, f"at most {MAX_CUBOIDS}")
 
 
-def _children(block: Block, index: dict[str, int]) -> list[tuple[int, str, int]]:
-    """(statement, name, number of copies) of every cuboid of `block` that another block fills."""
-    copies = {cuboid.name: 1 for cuboid in _cuboids(block)}
+def _children(block: Block, index: dict[str, int]) -> list[tuple[int, int, int]]:
+    """(statement, block, number of boxes it fills) of every cuboid of `block` that another block fills."""
+    filled = {
+        s.name: at for at, s in enumerate(block.statements) if isinstance(s, Cuboid) and s.name in index
+    }
+    copies = dict.fromkeys(filled, 1)
     for statement in block.statements:
-        if clones := clone_count(statement):
-            copies[statement.source] += clones
-    return [(s, c.name, copies[c.name]) for s, c in enumerate(_cuboids(block)) if c.name in index]
+        if isinstance(statement, Reflect | Translate) and statement.source in copies:
+            copies[statement.source] += clone_count(statement)
+    return [(at, index[name], copies[name]) for name, at in filled.items()]

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Num
 from torch import Tensor
 
+from .checking import check_block
 from .compiling import Compiler
 from .errors import ProgramError
 from .hierarchy import Layout, place
@@ -14,7 +15,7 @@ from .program import Block, Program
 from .shape import Shape, Shapes
 
 
-def execute(program: Program, parameters: Float[Tensor, "*batch p"] | None = None) -> Shape | Shapes:
+def execute(program: Program, parameters: Num[Tensor, "*batch p"] | None = None) -> Shape | Shapes:
     """Run one program. Raises ProgramError when the geometry is not finite.
 
     parameters  (p,) or (batch, p): other numbers for the same structure, in text order; gradients flow to them.
@@ -23,6 +24,7 @@ def execute(program: Program, parameters: Float[Tensor, "*batch p"] | None = Non
     """
     if parameters is None:
         return execute_many([program])[0]
+    parameters = parameters if parameters.is_floating_point() else parameters.double()
     wanted = program.parameter_count
     if parameters.ndim not in (1, 2) or parameters.shape[-1] != wanted:
         raise ProgramError(
@@ -45,7 +47,9 @@ def execute_many(programs: Sequence[Program], dtype: torch.dtype = torch.float64
 
 def trace(block: Block) -> list[Shape]:
     """The state of a block after each of its statements, as shapes without hierarchy: imperative semantics made
-    visible (paper, Figure 4). The first shape, after the bbox line, has no cuboids."""
+    visible (paper, Figure 4). The first shape, after the bbox line, has no cuboids; boxes that other blocks fill are
+    drawn as leaves. Raises ProgramError for a block that makes no sense."""
+    check_block(block)
     prefixes = [Block(block.name, block.statements[: stop + 1]) for stop in range(len(block.statements))]
     return list(execute_many([Program.unchecked((prefix,)) for prefix in prefixes]))
 

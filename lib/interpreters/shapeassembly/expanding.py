@@ -2,6 +2,7 @@
 
 import torch
 
+from .checking import check_block
 from .compiling import Compiler
 from .machine import Machine
 from .program import Attach, Block, Cuboid
@@ -11,8 +12,10 @@ def expand(block: Block) -> Block:
     """The same block without squeeze, reflect and translate; it builds the same cuboids in the same order.
 
     Copies become cuboids of their own, declared with the size their source has in the end; where a copy is attached
-    depends on where its source came to stand, so the block is executed to find out.
+    depends on where its source came to stand, so the block is executed to find out. Raises ProgramError for a block
+    that makes no sense.
     """
+    check_block(block)
     compiler = Compiler()
     rows = compiler.add(block).rows
     numbers = [n for s in block.statements for n in s.numbers]

@@ -108,6 +108,6 @@ def _grid(like: Tensor) -> Float[Tensor, "samples 3"]:
     return torch.stack([x, y, z], -1).reshape(-1, 3)
 
 
-def _rounded_square_distance(a: Float[Tensor, "*n 3"], b: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n"]:
+def _rounded_square_distance(a: Float[Tensor, "*#n 3"], b: Float[Tensor, "*#n 3"]) -> Float[Tensor, "*#n"]:
     a, b = a.float(), b.float()
     return (a * a).sum(-1) + (b * b).sum(-1) - 2 * (a * b).sum(-1)

@@ -76,6 +76,8 @@ def place(layout: Layout, state: Cuboids) -> Cuboids:
     Quirk: contents are scaled in size, componentwise and in their own axes, but their positions are not: it shows
     when attachments changed the size of a filled box.
     """
+    if not layout.name:
+        return state[:, :0]
     device = state.size.device
     row, parent, bbox, flip, level = (
         torch.tensor(numbers, device=device)

@@ -81,7 +81,9 @@ class Machine:
             result = grow(cuboid, still)
         else:
             result = self._turn(group, cuboid, point, target)
-        self._write(moved, result)
+        self.state.size[:, moved] = self._split(result.size)
+        self.state.center[:, moved] = self._split(result.center)
+        self.state.axes[:, moved] = self._split(result.axes)
         self.points[:, 2 * numbers.start : 2 * numbers.stop : 2] = self._split(point)
         self.points[:, 2 * numbers.start + 1 : 2 * numbers.stop : 2] = self._split(still_point)
         self.targets[:, numbers] = self._split(target)
@@ -100,13 +102,9 @@ class Machine:
         taken = self.state[:, rows]
         return Cuboids(taken.size.flatten(0, 1), taken.center.flatten(0, 1), taken.axes.flatten(0, 1))
 
-    def _write(self, rows: Tensor, result: Cuboids) -> None:
-        self.state.size[:, rows] = self._split(result.size)
-        self.state.center[:, rows] = self._split(result.center)
-        self.state.axes[:, rows] = self._split(result.axes)
-
     def _split(self, tensor: Tensor) -> Tensor:
-        return tensor.unflatten(0, (len(self.values), -1))
+        variants = len(self.values)
+        return tensor.unflatten(0, (variants, len(tensor) // max(variants, 1)))
 
     def _index(self, numbers) -> Tensor:
         return torch.as_tensor(numbers, dtype=torch.long, device=self.device)

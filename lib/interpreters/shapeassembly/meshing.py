@@ -48,6 +48,6 @@ def parts_obj(cuboids: Cuboids, names: list[str]) -> str:
     for i, name in enumerate(names):
         part = boxes_mesh(cuboids[i : i + 1], np.zeros((1, 3), np.uint8))
         lines.append(f"o {name}")
-        lines += ["v " + " ".join(f"{x:.6f}" for x in corner) for corner in part.vertices]
+        lines += ["v " + " ".join(f"{x:.9g}" for x in corner) for corner in part.vertices]
         lines += ["f " + " ".join(str(8 * i + k + 1) for k in face) for face in part.faces]
     return "\n".join(lines) + "\n"

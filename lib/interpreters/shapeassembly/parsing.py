@@ -4,7 +4,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from .errors import ProgramError
+from .errors import ProgramError, quoted
 from .program import (
     AXES,
     FACES,
@@ -20,7 +20,7 @@ from .program import (
 )
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEADER = re.compile(r"\s*Assembly\s+([A-Za-z_][A-Za-z0-9_]*)\s*\{\s*$")
 _STATEMENT = re.compile(r"\s*(?:([^\s=(]+)\s*=\s*)?([^\s=(]+)\s*\((.*)\)\s*$")
 _STATEMENT_FORMS = "Cuboid, attach, squeeze, reflect or translate"
@@ -54,7 +54,9 @@ def parse(text: str | bytes) -> Program:
             statements.append(_statement(line, row))
             rows[-1].append(row)
     if statements is not None:
-        raise ProgramError(f"the text ends inside block {name!r}", len(lines), 1, "", "a closing brace '}'")
+        raise ProgramError(
+            f"the text ends inside block {quoted(name)}", len(lines), 1, "", "a closing brace '}'"
+        )
     if not blocks:
         raise ProgramError("the program is empty", 1, 1, "", "'Assembly NAME {'")
     return Program(tuple(blocks), Source(lines, rows))
@@ -116,7 +118,7 @@ def _header(line: str, row: int) -> str:
     token = line.split()[0]
     if token == "}":
         raise _error(line, row, token, "a closing brace without a block", "'Assembly NAME {'")
-    raise _error(line, row, token, f"found {line.strip()[:40]!r} outside a block", "'Assembly NAME {'")
+    raise _error(line, row, token, f"found {quoted(line.strip())} outside a block", "'Assembly NAME {'")
 
 
 def _statement(line: str, row: int) -> Statement:
@@ -127,7 +129,7 @@ def _statement(line: str, row: int) -> Statement:
     kinds = _ARGUMENTS.get(command)
     if kinds is None:
         raise ProgramError(
-            f"unknown statement {command!r}", row + 1, match.start(2) + 1, command, _STATEMENT_FORMS
+            f"unknown statement {quoted(command)}", row + 1, match.start(2) + 1, command, _STATEMENT_FORMS
         )
     if (target is not None) != (command == "Cuboid"):
         expected = "'NAME = Cuboid(…)'" if command == "Cuboid" else f"{command}(…) without a name and '='"
@@ -142,10 +144,11 @@ def _statement(line: str, row: int) -> Statement:
     if command == "Cuboid" and len(words) == 3:
         words.append("False")  # the flag may be left out
     if len(words) != len(kinds):
-        found = f"{command} with {len(words)} arguments"
-        raise ProgramError(
-            found, row + 1, match.start(3) + 1, body.strip(), f"{len(kinds)}: {', '.join(kinds)}"
-        )
+        found, expected = f"{command} with {len(words)} arguments", f"{len(kinds)}: {', '.join(kinds)}"
+        if ")" in body or "(" in body:
+            found, expected = "a second parenthesis", "one statement a line"
+        column = match.start(3) + 1 + len(body) - len(body.lstrip())
+        raise ProgramError(found, row + 1, column, body.strip(), expected)
     values, column = [], match.start(3)
     for word, kind in zip(words, kinds):
         values.append(_READERS[kind](word.strip(), row, column + 1 + len(word) - len(word.lstrip())))
@@ -170,10 +173,10 @@ def _number(word: str, row: int, column: int) -> Number:
         value = float(word)
         if math.isfinite(value):
             # A whole number stays one, so that the text comes back as it was written.
-            return int(word) if word.isdigit() and abs(value) < 1e15 else value
-        raise ProgramError(f"{word} is too large", row + 1, column, word, "a finite number")
+            return int(word) if word.isdigit() and len(word) < 16 else value
+        raise ProgramError(f"{quoted(word)} is too large", row + 1, column, word, "a finite number")
     raise ProgramError(
-        f"{word!r} is not a number", row + 1, column, word, "a finite decimal number such as 0.5"
+        f"{quoted(word)} is not a number", row + 1, column, word, "a finite decimal number such as 0.5"
     )
 
 
@@ -181,15 +184,20 @@ def _count(word: str, row: int, column: int) -> int:
     if word.isdecimal() and word.isascii() and len(word) < 10 and int(word) >= 1:
         return int(word)
     raise ProgramError(
-        f"{word!r} is not a count", row + 1, column, word, "a whole number of copies, at least 1"
+        f"{quoted(word)} is not a count", row + 1, column, word, "a whole number of copies, at least 1"
     )
 
 
+def is_name(word: object) -> bool:
+    """Can it name a cuboid or a block?"""
+    return isinstance(word, str) and bool(_NAME.fullmatch(word))
+
+
 def _name(word: str, row: int, column: int) -> str:
-    if _NAME.fullmatch(word):
+    if is_name(word):
         return word
     raise ProgramError(
-        f"{word!r} is not a name", row + 1, column, word, "the name of a cuboid, such as cube0"
+        f"{quoted(word)} is not a name", row + 1, column, word, "the name of a cuboid, such as cube0"
     )
 
 
@@ -197,7 +205,7 @@ def _one_of(choices: dict, what: str):
     def read(word: str, row: int, column: int):
         if word in choices:
             return choices[word]
-        raise ProgramError(f"{word!r} is not {what}", row + 1, column, word, " or ".join(choices))
+        raise ProgramError(f"{quoted(word)} is not {what}", row + 1, column, word, " or ".join(choices))
 
     return read
 
@@ -222,7 +230,7 @@ def _malformed(line: str, row: int) -> ProgramError:
     if "(" in line and ")" not in line:
         return ProgramError("a parenthesis is never closed", row + 1, len(line.rstrip()) + 1, "", "')'")
     return _error(
-        line, row, word, f"found {line.strip()[:40]!r}", f"a statement: {_STATEMENT_FORMS}, or '}}'"
+        line, row, word, f"found {quoted(line.strip())}", f"a statement: {_STATEMENT_FORMS}, or '}}'"
     )
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from ..cuboids import Cuboids
-from .errors import ProgramError
+from .errors import ProgramError, quoted
 from .hierarchy import Layout
 from .program import Program
 
@@ -72,7 +72,7 @@ class Shape:
 
     def bounds(self) -> Float[Tensor, "2 3"]:
         """Smallest and largest coordinates of the leaves."""
-        return self.cuboids.bounds()
+        return self._drawn().bounds()
 
     def occupancy(self, points: Float[Tensor, "m 3"]) -> Bool[Tensor, "m"]:
         """Is each point inside or on a leaf?"""
@@ -80,7 +80,7 @@ class Shape:
 
     def surface_points(self, n: int, seed: int = 0) -> Float[Tensor, "n 3"]:
         """n points on the leaves' faces, uniform by area (faces inside other leaves count); gradients flow."""
-        return self.cuboids.surface_points(n, seed)
+        return self._drawn().surface_points(n, seed)
 
     def voxel_centers(self, resolution: int) -> Float[Tensor, "r r r 3"]:
         """Centers of the voxels, [x, y, z]: a cube about the middle of the bounds, as wide as the longest side."""
@@ -104,13 +104,19 @@ class Shape:
         """The shape as a GLB file, one named part per leaf."""
         from .meshing import parts_scene
 
-        return parts_scene(self.cuboids, self.colors, self.names).export(file_type="glb")
+        return parts_scene(self._drawn(), self.colors, self.names).export(file_type="glb")
 
     def to_obj(self) -> str:
         """The shape as an OBJ file, one named object per leaf."""
         from .meshing import parts_obj
 
         return parts_obj(self.cuboids, self.names)
+
+    def _drawn(self) -> Cuboids:
+        """The leaves, of which there must be some. Raises ProgramError for a shape without any."""
+        if not len(self.cuboids):
+            raise ProgramError("the shape has no cuboids", expected="at least one Cuboid besides the bbox")
+        return self.cuboids
 
 
 class Shapes(Sequence):
@@ -161,12 +167,14 @@ class Shapes(Sequence):
 
 
 def _finite(boxes: Cuboids) -> Bool[Tensor, "*n"]:
-    return (boxes.size + boxes.center + boxes.axes.sum(-1)).sum(-1).isfinite()
+    """Are all corners finite? Told from the farthest any corner can be, without building the corners."""
+    reach = (boxes.size.unsqueeze(-1) * boxes.axes).abs().sum(-2)
+    return (boxes.center.abs() + reach).isfinite().all(-1)
 
 
 def _require_finite(boxes: Cuboids, layout: Layout, first: int) -> None:
     broken = (~_finite(boxes)).nonzero()
     if len(broken):
         name = layout.path(first + int(broken[0]))
-        raise ProgramError(f"the attachments of {name!r} have no finite result", token=name,
-                           expected="numbers whose geometry can be computed")  # fmt: skip
+        found = f"the attachments of {quoted(name)} have no finite result"
+        raise ProgramError(found, token=name, expected="numbers whose geometry can be computed")

@@ -155,7 +155,7 @@ def chain(depth: int) -> str:
     return "".join(blocks) + block_text(name=f"Program_{depth - 1}")
 
 
-@pytest.mark.parametrize("depth", [100, 3_000, 20_000])
+@pytest.mark.parametrize("depth", [100, 3_000, 8_000])
 def test_blocks_within_blocks(depth, time_limit):
     """Deep ones may be refused; Python's recursion limit has no say in it, and names do not pile up."""
     with time_limit(2 * SOON):

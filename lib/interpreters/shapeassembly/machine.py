@@ -81,12 +81,12 @@ class Machine:
             result = grow(cuboid, still)
         else:
             result = self._turn(group, cuboid, point, target)
-        self.state.size[:, moved] = self._split(result.size)
-        self.state.center[:, moved] = self._split(result.center)
-        self.state.axes[:, moved] = self._split(result.axes)
-        self.points[:, 2 * numbers.start : 2 * numbers.stop : 2] = self._split(point)
-        self.points[:, 2 * numbers.start + 1 : 2 * numbers.stop : 2] = self._split(still_point)
-        self.targets[:, numbers] = self._split(target)
+        self.state.size[:, moved] = self._split(result.size, moved)
+        self.state.center[:, moved] = self._split(result.center, moved)
+        self.state.axes[:, moved] = self._split(result.axes, moved)
+        self.points[:, 2 * numbers.start : 2 * numbers.stop : 2] = self._split(point, moved)
+        self.points[:, 2 * numbers.start + 1 : 2 * numbers.stop : 2] = self._split(still_point, moved)
+        self.targets[:, numbers] = self._split(target, moved)
 
     def _turn(self, group: Group, cuboid: Cuboids, point: Tensor, target: Tensor) -> Cuboids:
         earlier = self._index(group.earlier)
@@ -102,9 +102,8 @@ class Machine:
         taken = self.state[:, rows]
         return Cuboids(taken.size.flatten(0, 1), taken.center.flatten(0, 1), taken.axes.flatten(0, 1))
 
-    def _split(self, tensor: Tensor) -> Tensor:
-        variants = len(self.values)
-        return tensor.unflatten(0, (variants, len(tensor) // max(variants, 1)))
+    def _split(self, tensor: Tensor, rows: Tensor) -> Tensor:
+        return tensor.unflatten(0, (len(self.values), len(rows)))
 
     def _index(self, numbers) -> Tensor:
         return torch.as_tensor(numbers, dtype=torch.long, device=self.device)

@@ -1,6 +1,6 @@
 """Does a program make sense? Everything that can be wrong with a readable program, checked before it runs."""
 
-import sys
+import math
 from dataclasses import dataclass, field
 
 from .errors import ProgramError, quoted
@@ -52,7 +52,10 @@ def clone_count(statement: Statement) -> int:
 
 def is_finite(number: object) -> bool:
     """Is it a number that a float can hold?"""
-    return isinstance(number, int | float) and abs(number) <= sys.float_info.max
+    try:
+        return isinstance(number, int | float) and math.isfinite(number)
+    except OverflowError:  # a whole number beyond every float
+        return False
 
 
 @dataclass

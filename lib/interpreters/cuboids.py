@@ -128,7 +128,7 @@ def inverse_axes(axes: Float[Tensor, "*n 3 3"]) -> Float[Tensor, "*n 3 3"]:
     return columns / (right * columns[..., 0]).sum(-1)[..., None, None]
 
 
-def cross(a: Float[Tensor, "*n 3"], b: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n 3"]:
+def cross(a: Float[Tensor, "*#n 3"], b: Float[Tensor, "*#n 3"]) -> Float[Tensor, "*m 3"]:
     """Cross product over the last dimension."""
     return torch.linalg.cross(a, b, dim=-1)
 

@@ -99,4 +99,6 @@ def _descend(
 def _limits(program: Program) -> tuple[Tensor, Tensor]:
     """Smallest and largest value of each parameter while fitting: sizes positive, coordinates in [0, 1]."""
     is_size = torch.tensor([name.split(":")[2] == "Cuboid" for name in program.parameter_names()])
-    return torch.where(is_size, SMALLEST, 0.0).double(), torch.where(is_size, torch.inf, 1.0).double()
+    low, high = torch.zeros(len(is_size)).double(), torch.ones(len(is_size)).double()
+    low[is_size], high[is_size] = SMALLEST, torch.inf
+    return low, high

@@ -2,8 +2,8 @@
 
 import textwrap
 
+import numpy as np
 from matplotlib.figure import Figure
-from torch import Tensor
 
 from lib.interpreters.shapeassembly import Attach, Block, Shape, trace
 from lib.viewing.figure import film_strip
@@ -36,7 +36,7 @@ def _wrapped(text: str, width: int) -> str:
     return "\n".join(textwrap.wrap(text, width, subsequent_indent="  "))
 
 
-def _marks(state: Shape, statement) -> dict[str, Tensor]:
+def _marks(state: Shape, statement) -> dict[str, np.ndarray]:
     if not isinstance(statement, Attach):
         return {}
     box = {path.rpartition("/")[2]: number for number, path in enumerate(state.box_names)}

@@ -94,6 +94,7 @@ def _summary(rows: list[dict]) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
+    """Run from the command line; returns the exit code."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

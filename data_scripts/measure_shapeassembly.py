@@ -36,6 +36,7 @@ def measure() -> dict[str, dict]:
 
 
 def main(arguments: list[str] | None = None) -> int:
+    """Run from the command line; returns the exit code."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

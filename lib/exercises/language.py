@@ -35,11 +35,10 @@ def check_table(text: object) -> str:
     """Exercise 1.1: a table with a top and four legs, in at most nine statements."""
     if text is None:
         return UNANSWERED
-    try:
-        program = parse(text)
-        shape = execute(program)
-    except ProgramError as error:
-        return hint(str(error))
+    made = _executed(text)
+    if isinstance(made, str):
+        return made
+    program, shape = made
     statements = [statement for _, _, statement in program.statements()]
     if len(statements) > 9:
         return hint(f"{len(statements)} statements; nine are enough if reflect makes two of the legs")
@@ -94,11 +93,10 @@ def check_repair(text: object) -> str:
     """Exercise 1.3: the broken bench, made to run without adding or removing a statement."""
     if text is None:
         return UNANSWERED
-    try:
-        program = parse(text)
-        shape = execute(program)
-    except ProgramError as error:
-        return hint(str(error))
+    made = _executed(text)
+    if isinstance(made, str):
+        return made
+    program, shape = made
     if sum(1 for _ in program.statements()) != 8:
         return hint("keep all eight statements: each needs one small change at most")
     if len(shape.cuboids) != 4:
@@ -106,6 +104,15 @@ def check_repair(text: object) -> str:
             f"it runs, but draws {len(shape.cuboids)} cuboids; the bench has a seat, a rail and two legs"
         )
     return OK
+
+
+def _executed(text: object) -> tuple[Program, Shape] | str:
+    """The program of a text and its shape, or the hint that its error gives."""
+    try:
+        program = parse(text)
+        return program, execute(program)
+    except ProgramError as error:
+        return hint(str(error))
 
 
 def _sides(shape: Shape) -> list[float]:

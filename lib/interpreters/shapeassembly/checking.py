@@ -72,6 +72,7 @@ class _BlockCheck:
     phase: int = 0
 
     def run(self) -> None:
+        """Raise ProgramError for the first thing that is wrong with the block."""
         first = self.block.statements[0] if self.block.statements else None
         if not isinstance(first, Cuboid) or first.name != BBOX:
             at, expected = (0 if first else -1), "'bbox = Cuboid(…)' as its first statement"
@@ -124,6 +125,7 @@ class _BlockCheck:
             )
 
     def cuboid(self, at: int, cuboid: Cuboid) -> None:
+        """A new name, and a block behind it where it promises one."""
         name = cuboid.name
         if not is_name(name):
             raise self.error(at, "", f"{quoted(str(name))} is not a name", "one such as cube0")
@@ -136,6 +138,7 @@ class _BlockCheck:
         self.declared[name] = at
 
     def attachment(self, at: int, statement: Attach | Squeeze) -> None:
+        """Partners that stand on something; what is moved stands on them from then on."""
         moved = statement.moved
         if moved == BBOX:
             raise self.error(at, BBOX, "the bounding box cannot be moved", "another cuboid")

@@ -104,9 +104,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--share", type=float, default=0.2, help="how far the start's numbers are off")
     parser.add_argument("--steps", type=int, default=120)
     parser.add_argument("--points", type=int, default=600)
-    parser.add_argument("--out", type=Path, default=REPOSITORY / "build" / "fit_shapeassembly.jsonl")
+    parser.add_argument(
+        "--out", type=Path, help="where to keep the rows (default: build/, named by the settings)"
+    )
+    options = parser.parse_args(arguments)
+    if options.out is None:
+        name = (
+            f"fit_{options.category}_{options.split}_{options.share}_{options.steps}_{options.points}.jsonl"
+        )
+        options.out = REPOSITORY / "build" / name
     try:
-        print(_summary(fit_all(parser.parse_args(arguments))))
+        print(_summary(fit_all(options)))
+        print(f"kept in {options.out}")
     except DataError as error:
         print(error, file=sys.stderr)
         return 1

@@ -63,7 +63,7 @@ def test_curves_show_their_data():
     figure = loss_curves({"one": torch.tensor([3.0, 1.0])}, floor=0.5)
     lines = figure.axes[0].get_lines()
     assert lines[0].get_ydata().tolist() == [3, 1] and lines[1].get_ydata()[0] == 0.5
-    figure = plot_against(torch.tensor([0.0, 1.0]), {"result": torch.tensor([2.0, 5.0])}, "x", "title")
+    figure = plot_against(torch.tensor([0.0, 1.0]), {"result": torch.tensor([2.0, 5.0])}, "x", "y", "title")
     assert figure.axes[0].get_lines()[0].get_ydata().tolist() == [2, 5]
 
 

@@ -4,13 +4,14 @@ from ..interpreters.shapeassembly import (
     Attach,
     Program,
     ProgramError,
-    Reflect,
     Shape,
     Squeeze,
     execute,
     parse,
 )
 from . import OK, UNANSWERED, hint
+
+NEAR = 0.02  # world units that a leg may miss the floor or the top by
 
 
 def check_height(answer: object, original: Program, height: float) -> str:
@@ -32,7 +33,7 @@ def check_height(answer: object, original: Program, height: float) -> str:
 
 
 def check_table(text: object) -> str:
-    """Exercise 1.1: a table with a top and four legs, in at most nine statements."""
+    """Exercise 1.1: a table with a top and four legs from floor to top, in at most nine statements."""
     if text is None:
         return UNANSWERED
     made = _executed(text)
@@ -42,47 +43,54 @@ def check_table(text: object) -> str:
     statements = [statement for _, _, statement in program.statements()]
     if len(statements) > 9:
         return hint(f"{len(statements)} statements; nine are enough if reflect makes two of the legs")
-    if not any(isinstance(s, Squeeze) for s in statements) or not any(
-        isinstance(s, Reflect) for s in statements
-    ):
-        return hint("use squeeze for the legs and reflect for their mirror images")
     if len(shape.cuboids) < 5:
         return hint(f"{len(shape.cuboids)} cuboids; a top and four legs are five")
-    return _stands_on_four_corners(shape)
+    return _check_legs(shape)
 
 
-def _stands_on_four_corners(shape: Shape) -> str:
-    low, high = shape.bounds().tolist()
-    boxes = shape.cuboids
-    feet = [c for c, s in zip(boxes.center.tolist(), boxes.size.tolist(), strict=True)
-            if abs(c[1] - s[1] / 2 - low[1]) < 1e-3 and s[1] > 0.5 * (high[1] - low[1])]  # fmt: skip
-    quarters = {(x > 0, z > 0) for x, _, z in feet}
-    if len(quarters) < 4:
-        return hint(f"legs stand in {len(quarters)} of the four quarters of the floor")
-    if not any(
-        s[0] > 0.9 * (high[0] - low[0]) and s[2] > 0.9 * (high[2] - low[2]) for s in boxes.size.tolist()
-    ):
+def _check_legs(shape: Shape) -> str:
+    """The widest cuboid is the top; under it a leg in each quarter, near the corner, from floor to top."""
+    (left, floor, back), (right, _, front) = shape.bounds().tolist()
+    low = shape.cuboids.corners().amin(1).tolist()
+    high = shape.cuboids.corners().amax(1).tolist()
+    areas = [(b[0] - a[0]) * (b[2] - a[2]) for a, b in zip(low, high)]
+    top = areas.index(max(areas))
+    if areas[top] < 0.8 * (right - left) * (front - back):
         return hint("no cuboid is wide and deep enough to be the top")
-    return OK
+    legs = [i for i in range(len(low)) if i != top and low[i][1] < floor + NEAR]
+    if any(abs(high[i][1] - low[top][1]) > NEAR for i in legs):
+        return hint("a leg should reach from the floor to the underside of the top, no farther")
+    quarters = set()
+    for i in legs:
+        x, z = (low[i][0] + high[i][0] - left - right) / 2, (low[i][2] + high[i][2] - back - front) / 2
+        if abs(x) > (right - left) / 4 and abs(z) > (front - back) / 4:
+            quarters.add((x > 0, z > 0))
+    return OK if len(quarters) == 4 else hint(f"legs stand near {len(quarters)} of the four corners")
 
 
 def check_expansion(answer: object, squeeze: Squeeze) -> str:
     """Exercise 1.2: the two attaches that a squeeze between two cuboids stands for."""
     if answer is None:
         return UNANSWERED
-    if not isinstance(answer, list) or len(answer) != 2 or not all(isinstance(a, Attach) for a in answer):
+    if (
+        not isinstance(answer, list | tuple)
+        or len(answer) != 2
+        or not all(isinstance(a, Attach) for a in answer)
+    ):
         return hint("the answer is a list of two Attach statements")
     u, v = squeeze.numbers
     wanted = [
         Attach(squeeze.moved, squeeze.first, (1.0, 0.5, 0.5, 0.0, u, v)),
         Attach(squeeze.moved, squeeze.second, (0.0, 0.5, 0.5, 1.0, u, v)),
     ]
-    for number, (got, right) in enumerate(zip(answer, wanted, strict=True), 1):
+    for number, (got, right) in enumerate(zip(answer, wanted), 1):
         if (got.moved, got.still) != (right.moved, right.still):
             return hint(f"attach {number} should move {right.moved} to {right.still}")
-        if any(abs(a - b) > 1e-9 for a, b in zip(got.numbers[:3], right.numbers[:3], strict=True)):
+        if len(got.numbers) != 6:
+            return hint(f"attach {number} has {len(got.numbers)} numbers, it needs six")
+        if any(abs(a - b) > 1e-9 for a, b in zip(got.numbers[:3], right.numbers[:3])):
             return hint(f"attach {number} starts at the center of a face of {right.moved}: which one?")
-        if any(abs(a - b) > 1e-9 for a, b in zip(got.numbers[3:], right.numbers[3:], strict=True)):
+        if any(abs(a - b) > 1e-9 for a, b in zip(got.numbers[3:], right.numbers[3:])):
             return hint(
                 f"attach {number} ends on the face of {right.still} that looks at {right.moved}, at (u, v)"
             )
@@ -98,11 +106,12 @@ def check_repair(text: object) -> str:
         return made
     program, shape = made
     if sum(1 for _ in program.statements()) != 8:
-        return hint("keep all eight statements: each needs one small change at most")
-    if len(shape.cuboids) != 4:
-        return hint(
-            f"it runs, but draws {len(shape.cuboids)} cuboids; the bench has a seat, a rail and two legs"
-        )
+        return hint("keep all eight statements; the mistakes are inside lines, or in their order")
+    centers = sorted([round(x, 2) for x in center] for center in shape.cuboids.center.tolist())
+    if len(centers) != 4 or [-0.64, -0.03, 0.0] not in centers or [0.64, -0.03, 0.0] not in centers:
+        return hint("it runs, but a bench stands on two legs, one a mirror image of the other")
+    if [0.0, -0.03, 0.0] not in centers:
+        return hint("it runs, but the rail should go from the middle of one leg to the middle of the other")
     return OK
 
 

@@ -133,6 +133,13 @@ def cross(a: Float[Tensor, "*#n 3"], b: Float[Tensor, "*#n 3"]) -> Float[Tensor,
     return torch.linalg.cross(a, b, dim=-1)
 
 
+def skew(v: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n 3 3"]:
+    """The matrix S of each vector with S w = v x w."""
+    x, y, z = v.unbind(-1)
+    zero = torch.zeros_like(x)
+    return torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).unflatten(-1, (3, 3))
+
+
 def concatenate(parts: list[Cuboids], dim: int = 0) -> Cuboids:
     """Several batches of boxes as one, joined along `dim`."""
     return Cuboids(

@@ -8,11 +8,12 @@ from jaxtyping import Float
 from torch import Tensor
 from tqdm import tqdm
 
-from ..interpreters.cuboids import Cuboids
+from ..interpreters.cuboids import Cuboids, skew
 from ..interpreters.shapeassembly import Program, ProgramError, execute
 from ..metrics.points import chamfer_distance
 
 SMALLEST = 0.01  # of a cuboid's side, world units, while fitting
+FIRST_SEED = 1_000_000  # of the steps' samples: far from the small seeds with which targets are drawn
 
 
 @dataclass(frozen=True)
@@ -37,13 +38,13 @@ def fit_program(
 ) -> Fit:
     """Adam on the program's continuous parameters; the loss is the Chamfer distance to `target`, world units.
 
-    Each step samples `points` fresh surface points (seeded by the step). Sizes stay above SMALLEST, coordinates in
-    [0, 1]. Raises ProgramError where the geometry stops being finite.
+    Each step samples `points` fresh surface points (seeded, so that a run can be repeated). Sizes stay above
+    SMALLEST, coordinates in [0, 1]. Raises ProgramError where the geometry stops being finite.
     """
     low, high = _limits(program)
 
-    def surface(vector: Tensor, step: int) -> Tensor:
-        return execute(program, vector).surface_points(points, step)
+    def surface(vector: Tensor, seed: int) -> Tensor:
+        return execute(program, vector).surface_points(points, seed)
 
     return _descend(program.parameters(), (low, high), surface, target, steps, rate)
 
@@ -51,21 +52,22 @@ def fit_program(
 def fit_cuboids(
     start: Cuboids, target: Float[Tensor, "m 3"], steps: int = 150, rate: float = 0.01, points: int = 512
 ) -> Fit:
-    """The same descent on free boxes: six numbers each, size and center, with nothing to hold them together."""
-    vector = torch.cat([start.size, start.center], -1)
-    low = torch.cat([torch.full_like(start.size, SMALLEST), torch.full_like(start.center, -torch.inf)], -1)
+    """The same descent on free boxes: nine numbers each (size, center, turn), nothing to hold them together."""
+    vector = torch.cat([start.size, start.center, torch.zeros_like(start.size)], -1).detach()
+    low = torch.full_like(vector, -torch.inf)
+    low[:, :3] = SMALLEST
 
-    def surface(vector: Tensor, step: int) -> Tensor:
-        return free_cuboids(vector, start).surface_points(points, step)
+    def surface(vector: Tensor, seed: int) -> Tensor:
+        return free_cuboids(vector, start).surface_points(points, seed)
 
     limits = low.flatten(), torch.full_like(low, torch.inf).flatten()
     return _descend(vector.flatten(), limits, surface, target, steps, rate)
 
 
 def free_cuboids(vector: Float[Tensor, " p"], start: Cuboids) -> Cuboids:
-    """Boxes from a vector of `fit_cuboids`; their axes are those of `start`."""
-    size, center = vector.reshape(-1, 6).split(3, dim=-1)
-    return Cuboids(size, center, start.axes.detach())
+    """Boxes from a vector of `fit_cuboids`: size, center, and a turn (axis times angle) from the axes of `start`."""
+    size, center, turn = vector.reshape(-1, 9).split(3, dim=-1)
+    return Cuboids(size, center, start.axes.detach() @ torch.linalg.matrix_exp(skew(turn)).mT)
 
 
 def _descend(
@@ -76,12 +78,12 @@ def _descend(
     steps: int,
     rate: float,
 ) -> Fit:
-    """Adam from `vector`, kept within `limits`; surface(vector, step) gives the points to compare."""
+    """Adam from `vector`, kept within `limits`; surface(vector, seed) gives the points to compare."""
     vector = vector.detach().clamp(*limits).requires_grad_()
     optimizer = torch.optim.Adam([vector], lr=rate)
     losses, path = [], []
     for step in tqdm(range(steps), desc="fitting", leave=False, disable=None):
-        loss = chamfer_distance(surface(vector, step), target.to(vector))
+        loss = chamfer_distance(surface(vector, FIRST_SEED + step), target.to(vector))
         if not loss.isfinite():
             raise ProgramError(
                 f"step {step}: the distance to the target is not finite", expected="a smaller rate"

@@ -47,8 +47,8 @@ PAGE = """<!DOCTYPE html>
 </main></body></html>
 """
 INTRODUCTION = (
-    "Neural networks write shapes as small programs. This book reads, runs, changes and measures three languages "
-    "they write in: ShapeAssembly, constructive solid geometry (CSG) and CSG-Stump. Each chapter is a notebook, "
+    "Neural networks write shapes as small programs. This book reads, runs, changes and measures the languages "
+    "they write in, beginning with ShapeAssembly. Each chapter is a notebook, "
     "executed on this computer just now; <code>make lab</code> opens them for you to change."
 )
 

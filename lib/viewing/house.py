@@ -1,9 +1,14 @@
 """A map of this repository as a picture: what flows into what, and which notebook shows it."""
 
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
+
+NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
+INK = "#5b6475"
 
 # name: (x, y, width, text, notebook, colour); x and y of the middle, in a 100 x 46 plan
 _ROOMS = {
@@ -29,10 +34,13 @@ _DOORS = (
 
 
 def house_map() -> Figure:
-    """The flow from data to programs to shapes to networks; small numbers are notebooks."""
+    """The flow from data to programs to shapes to networks; small numbers are notebooks, dashed rooms are planned."""
     figure, ax = plt.subplots(figsize=(8.6, 3.9), dpi=100)
     plt.close(figure)
-    walls = {name: _room(ax, *room) for name, room in _ROOMS.items()}
+    built = {path.name[:2] for path in NOTEBOOKS.glob("[0-9][0-9]_*.ipynb")}
+    walls = {
+        name: _room(ax, *room, planned=not built & set(room[4].split())) for name, room in _ROOMS.items()
+    }
     for start, end, word, offset in _DOORS:
         _door(ax, start, end, walls, word, offset)
     ax.set(xlim=(0, 100), ylim=(2, 45), aspect="equal")
@@ -41,16 +49,18 @@ def house_map() -> Figure:
     return figure
 
 
-def _room(ax: Axes, x: float, y: float, width: float, text: str, notebook: str, color: str) -> FancyBboxPatch:
-    corner = (x - width / 2, y - 5.5)
+def _room(ax: Axes, x, y, width, text: str, notebook: str, color: str, planned: bool) -> FancyBboxPatch:
+    corner, style = (x - width / 2, y - 5.5), "--" if planned else "-"
     walls = FancyBboxPatch(
-        corner, width, 11, boxstyle="round,pad=0.6", facecolor=color, edgecolor="#5b6475", zorder=2
-    )
+        corner, width, 11, boxstyle="round,pad=0.6", facecolor="white" if planned else color, edgecolor=INK,
+        linestyle=style, zorder=2,
+    )  # fmt: skip
     ax.add_patch(walls)
-    ax.text(x, y + 0.8, text, ha="center", va="center", fontsize=9.5, zorder=3)
     ax.text(
-        x + width / 2, y - 5.7, notebook, ha="right", va="bottom", fontsize=7.5, color="#5b6475", zorder=3
+        x, y + 0.8, text, ha="center", va="center", fontsize=9.5, color=INK if planned else "black", zorder=3
     )
+    number = f"{notebook} planned" if planned else notebook
+    ax.text(x + width / 2, y - 5.7, number, ha="right", va="bottom", fontsize=7.5, color=INK, zorder=3)
     return walls
 
 
@@ -61,7 +71,7 @@ def _door(ax: Axes, start: str, end: str, walls: dict, word: str, offset: tuple[
     aside = (1.6 if y1 > y0 else -1.6) if both else 0
     style = {
         "arrowstyle": "-|>",
-        "color": "#5b6475",
+        "color": INK,
         "linewidth": 1.3,
         "patchA": walls[start],
         "patchB": walls[end],

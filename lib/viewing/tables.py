@@ -34,6 +34,7 @@ def compare_bars(
         ax.set_title(title, fontsize=10)
         ax.margins(y=0.15)
         ax.spines[["top", "right"]].set_visible(False)
-    axes[0, 0].legend(fontsize=8, frameon=False)
-    figure.tight_layout()
+    figure.tight_layout(rect=(0, 0.08, 1, 1))
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncols=len(sources), fontsize=8, frameon=False)
     return figure

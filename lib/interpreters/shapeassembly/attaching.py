@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from ..cuboids import Cuboids, cross
+from ..cuboids import Cuboids, cross, skew
 
 CLOSE_ENOUGH = 1e-4  # one earlier attachment: nearer than this counts as attached
 ON_TARGET = 0.01  # two or more: nearer than this counts as attached, on a line, or turned the right way
@@ -99,8 +99,8 @@ def minimal_rotation(start: Points, end: Points) -> Float[Tensor, "rows 3 3"]:
     sine_square = torch.where(parallel, 1.0, _square(normal)[:, None, None])
     # (1 - cos) / sin^2, written so that neither end of the range divides by almost nothing.
     factor = torch.where(cosine > 0, 1 / (1 + cosine.clamp(min=0)), (1 - cosine) / sine_square)
-    skew = _skew(normal)
-    return torch.where(parallel, _half_turn(u), _eye(u) + skew + skew @ skew * factor)
+    turn = skew(normal)
+    return torch.where(parallel, _half_turn(u), _eye(u) + turn + turn @ turn * factor)
 
 
 def _half_turn(u: Points) -> Float[Tensor, "rows 3 3"]:
@@ -173,7 +173,7 @@ def _turn_about(axis: Points, u: Points, v: Points) -> Float[Tensor, "rows 3 3"]
     """Rotation about `axis` by the (unsigned) angle between the unit vectors u and v."""
     cosine = (u * v).sum(-1).clamp(-1, 1)[:, None, None]
     sine = _length(cross(u, v))[:, None, None]
-    return cosine * _eye(axis) + sine * _skew(axis) + (1 - cosine) * axis.unsqueeze(-1) * axis.unsqueeze(-2)
+    return cosine * _eye(axis) + sine * skew(axis) + (1 - cosine) * axis.unsqueeze(-1) * axis.unsqueeze(-2)
 
 
 def _extend(
@@ -231,13 +231,6 @@ def _length(v: Tensor) -> Tensor:
 def _unit(v: Tensor) -> Tensor:
     length = _length(v).unsqueeze(-1)
     return v / torch.where(length > 0, length, 1.0)
-
-
-def _skew(v: Points) -> Float[Tensor, "rows 3 3"]:
-    """The matrix S with S w = v x w."""
-    x, y, z = v.unbind(-1)
-    zero = torch.zeros_like(x)
-    return torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).unflatten(-1, (3, 3))
 
 
 def _eye(like: Tensor) -> Tensor:

@@ -41,6 +41,8 @@ def check(blocks: tuple[Block, ...], source: Source | None = None) -> None:
 
 def check_block(block: Block) -> None:
     """The same for one block by itself; whether other blocks fill its boxes is not asked."""
+    if not isinstance(block, Block):
+        raise ProgramError(f"found a {type(block).__name__}", expected="one block, such as program.blocks[0]")
     names = {statement.name for statement in block.statements if isinstance(statement, Cuboid)}
     _BlockCheck(0, block, Source.printed((block,)), names).run()
 

@@ -22,6 +22,8 @@ def execute(program: Program, parameters: Num[Tensor, "*batch p"] | None = None)
                 Their dtype and device are those of the result. Default: the program's own, float64.
     Returns a Shape; for a batch of parameters Shapes, one for each vector (all with the same number of leaves).
     """
+    if not isinstance(program, Program):
+        raise ProgramError(f"found a {type(program).__name__}", expected="a Program: parse the text first")
     if parameters is None:
         return execute_many([program])[0]
     parameters = parameters if parameters.is_floating_point() else parameters.double()

@@ -84,6 +84,8 @@ class Shape:
 
     def voxel_centers(self, resolution: int) -> Float[Tensor, "r r r 3"]:
         """Centers of the voxels, [x, y, z]: a cube about the middle of the bounds, as wide as the longest side."""
+        if not isinstance(resolution, int) or resolution < 1:
+            raise ValueError(f"found a resolution of {resolution}; expected a whole number, at least 1")
         low, high = self.bounds().detach()
         steps = (torch.arange(resolution).to(low) + 0.5) / resolution - 0.5
         grid = torch.stack(torch.meshgrid(steps, steps, steps, indexing="ij"), -1)

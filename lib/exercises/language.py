@@ -50,15 +50,16 @@ def check_table(text: object) -> str:
 
 def _check_legs(shape: Shape) -> str:
     """The widest cuboid is the top; under it a leg in each quarter, near the corner, from floor to top."""
-    (left, floor, back), (right, _, front) = shape.bounds().tolist()
+    (left, _, back), (right, _, front) = shape.bounds().tolist()
+    floor = -float(shape.boxes.size[0, 1]) / 2  # of the bounding box
     low = shape.cuboids.corners().amin(1).tolist()
     high = shape.cuboids.corners().amax(1).tolist()
     areas = [(b[0] - a[0]) * (b[2] - a[2]) for a, b in zip(low, high)]
     top = areas.index(max(areas))
     if areas[top] < 0.8 * (right - left) * (front - back):
         return hint("no cuboid is wide and deep enough to be the top")
-    legs = [i for i in range(len(low)) if i != top and low[i][1] < floor + NEAR]
-    if any(abs(high[i][1] - low[top][1]) > NEAR for i in legs):
+    legs = [i for i in range(len(low)) if i != top]
+    if any(abs(low[i][1] - floor) > NEAR or abs(high[i][1] - low[top][1]) > NEAR for i in legs):
         return hint("a leg should reach from the floor to the underside of the top, no farther")
     quarters = set()
     for i in legs:

@@ -77,9 +77,8 @@ def _grow_apart(cuboid: Cuboids, still: Cuboids) -> Cuboids:
 def closest_samples(a: Cuboids, b: Cuboids) -> tuple[Float[Tensor, "rows 3"], Float[Tensor, "rows 3"]]:
     """The closest pair of grid samples of each two boxes; the first in order x, y, z (x fastest) of equals.
 
-    Every sample of `a` needs to look only at the eight samples of `b` around it. Squared distances are rounded as
-    the data set's own search rounds them (float32, |a|^2 + |b|^2 - 2 a.b): between boxes with parallel faces many
-    pairs are equally close, and that rounding decided which one the real programs were fitted with.
+    Every sample of `a` needs to look only at the eight samples of `b` around it. (The data set's own search compares
+    float32 distances, so rounding decides between equals there; a handful of its programs hang on that.)
     """
     grid = _grid(a.size)
     found = [_closest_chunk(a[i : i + _CHUNK], b[i : i + _CHUNK], grid) for i in range(0, len(a), _CHUNK)]
@@ -92,7 +91,7 @@ def _closest_chunk(a: Cuboids, b: Cuboids, grid: Float[Tensor, "samples 3"]):
     lowest = (b.local_many(samples) * (GRID - 1)).floor().clamp(0, GRID - 2)
     around = (lowest.unsqueeze(-2) + _NEXT.to(lowest)) / (GRID - 1)  # (rows, 1000, 8, 3) local to b
     partners = b.world_many(around.flatten(1, 2)).unflatten(1, (-1, 8))
-    distance = _rounded_square_distance(samples.unsqueeze(-2), partners)  # (rows, 1000, 8)
+    distance = (samples.unsqueeze(-2) - partners).square().sum(-1)  # (rows, 1000, 8)
     shortest, which = distance.min(-1)
     first = shortest.argmin(-1)  # the first of equals
     row = torch.arange(len(a), device=first.device)
@@ -106,8 +105,3 @@ def _grid(like: Tensor) -> Float[Tensor, "samples 3"]:
     steps = torch.arange(GRID, dtype=like.dtype, device=like.device) / (GRID - 1)
     z, y, x = torch.meshgrid(steps, steps, steps, indexing="ij")
     return torch.stack([x, y, z], -1).reshape(-1, 3)
-
-
-def _rounded_square_distance(a: Float[Tensor, "*#n 3"], b: Float[Tensor, "*#n 3"]) -> Float[Tensor, "*#n"]:
-    a, b = a.float(), b.float()
-    return (a * a).sum(-1) + (b * b).sum(-1) - 2 * (a * b).sum(-1)

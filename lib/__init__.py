@@ -1,1 +1,1 @@
-"""Shape Programs: three languages in which neural networks write shapes, and the networks that write them."""
+"""Shape Programs: the languages in which neural networks write shapes; ShapeAssembly is the first of them."""

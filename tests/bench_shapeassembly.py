@@ -14,7 +14,7 @@ from lib import datasets
 from lib.interpreters.shapeassembly import Program, execute, execute_many, parse
 from tests.conftest import read_programs
 
-BATCH = 2000  # programs in lockstep: more are not faster, and memory stays below 2 GB
+BATCH = 2000  # programs at a time: more are not faster, and memory stays below 2 GB
 VARIANTS = 256
 
 

@@ -11,7 +11,7 @@ from lib.datasets import example
 from lib.interpreters.shapeassembly import execute, parse
 from lib.metrics.programs import PAPER_GROUND_TRUTH
 from lib.viewing.film import film
-from lib.viewing.gradients import draw_fit, gradient_bars, loss_curves, plot_against
+from lib.viewing.gradients import draw_fit, gradient_bars, plot_against
 from lib.viewing.house import house_map
 from lib.viewing.tables import compare_bars
 
@@ -60,9 +60,6 @@ def test_gradient_bars_have_the_gradients_height():
 
 
 def test_curves_show_their_data():
-    figure = loss_curves({"one": torch.tensor([3.0, 1.0])}, floor=0.5)
-    lines = figure.axes[0].get_lines()
-    assert lines[0].get_ydata().tolist() == [3, 1] and lines[1].get_ydata()[0] == 0.5
     figure = plot_against(torch.tensor([0.0, 1.0]), {"result": torch.tensor([2.0, 5.0])}, "x", "y", "title")
     assert figure.axes[0].get_lines()[0].get_ydata().tolist() == [2, 5]
 

@@ -34,8 +34,6 @@ def check_height(answer: object, original: Program, height: float) -> str:
 
 def check_table(text: object) -> str:
     """Exercise 1.1: a table with a top and four legs from floor to top, in at most nine statements."""
-    if text is None:
-        return UNANSWERED
     made = _executed(text)
     if isinstance(made, str):
         return made
@@ -100,8 +98,6 @@ def check_expansion(answer: object, squeeze: Squeeze) -> str:
 
 def check_repair(text: object) -> str:
     """Exercise 1.3: the broken bench, made to run without adding or removing a statement."""
-    if text is None:
-        return UNANSWERED
     made = _executed(text)
     if isinstance(made, str):
         return made
@@ -117,7 +113,9 @@ def check_repair(text: object) -> str:
 
 
 def _executed(text: object) -> tuple[Program, Shape] | str:
-    """The program of a text and its shape, or the hint that its error gives."""
+    """The program of a text and its shape, or what to tell the reader: unanswered, or the hint its error gives."""
+    if text is None:
+        return UNANSWERED
     try:
         program = parse(text)
         return program, execute(program)

@@ -1,4 +1,4 @@
-"""Figures about gradients: bars by parameter, loss curves, a fit against its target."""
+"""Figures about gradients: bars by parameter, curves over a number, a fit against its target."""
 
 from collections.abc import Mapping, Sequence
 
@@ -48,20 +48,6 @@ def gradient_bars(program: Program, gradient: Tensor, dots: Tensor | None = None
         xlabel="" if few else "number in the program's text, counted from 0", ylabel="derivative", title=title
     )
     ax.legend(fontsize=8, frameon=False, ncols=4)
-    return _finished(figure)
-
-
-def loss_curves(
-    losses: Mapping[str, Tensor], floor: float | None = None, title: str = "Chamfer distance"
-) -> Figure:
-    """Loss by step for each named run; `floor` is drawn as a dashed line."""
-    figure, ax = _axes(5.2, 2.8)
-    for name, values in losses.items():
-        ax.plot(values.detach().numpy(), label=name, linewidth=1.6)
-    if floor is not None:
-        ax.axhline(floor, color="#5b6475", linestyle="--", linewidth=1, label="two samples of the target")
-    ax.set(xlabel="step", title=title, ylim=(0, None))
-    ax.legend(fontsize=8, frameon=False)
     return _finished(figure)
 
 

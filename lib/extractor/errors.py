@@ -12,10 +12,20 @@ class PartGraphError(ValueError):
     def __init__(self, found: str, expected: str = "", node: str = "", file: str = ""):
         self.found, self.expected, self.node, self.file = found, expected, node, str(file)
         place = ", ".join(filter(None, [self.file, node and f"part {node}"]))
-        super().__init__(": ".join(filter(None, [place, found])) + (f"; expected {expected}" if expected else ""))
+        super().__init__(
+            ": ".join(filter(None, [place, found])) + (f"; expected {expected}" if expected else "")
+        )
 
     def __reduce__(self):  # travels between processes
         return type(self), (self.found, self.expected, self.node, self.file)
+
+    def in_file(self, file: str) -> "PartGraphError":
+        """The same error, saying which file it is about."""
+        return type(self)(self.found, self.expected, self.node, file)
+
+
+class PartGraphWarning(UserWarning):
+    """A part graph was read, but something in it was odd: axes that were set straight, or labels nobody knows."""
 
 
 class RejectedError(ValueError):

@@ -7,6 +7,7 @@
 World axes as everywhere here: x right, y up, z to the front; any unit of length.
 """
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -67,15 +68,44 @@ class PartGraph:
         if not len(shape.cuboids):
             raise PartGraphError("the shape has no cuboids", "at least one leaf", file=name)
         boxes, parents = shape.boxes.detach().to("cpu", torch.float64), shape.parents
+        drawn = shape.is_leaf
         below: dict[int, list[int]] = {}
         for number, parent in enumerate(parents):
             below.setdefault(parent, []).append(number)
 
-        def part(number: int) -> Part:
-            children = tuple(part(child) for child in below.get(number, ()))
+        def part(number: int) -> Part | None:
+            children = tuple(filter(None, map(part, below.get(number, ()))))
+            if not children and not drawn[number]:
+                return None  # a block without cuboids: nothing of it is seen
             return Part(UNLABELLED, boxes[number], children, number)
 
         return cls(part(0), category, name)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike, category: str = "") -> "PartGraph":
+        """The part graph in a JSON file. Raises PartGraphError; a PartGraphWarning tells of repairs and odd labels."""
+        from .files import read  # here and below: those modules build on this one
+
+        return read(path, category)
+
+    @classmethod
+    def from_json(cls, source: str | bytes | dict, category: str = "", file: str = "") -> "PartGraph":
+        """The part graph that a JSON text, or the object in it, describes; `file` is named in errors. As `read`."""
+        from .parsing import parse
+
+        return parse(source, category, file)
+
+    def to_json(self) -> str:
+        """StructureNet's JSON on one line, which `from_json` reads again. Raises PartGraphError."""
+        from .parsing import to_json
+
+        return to_json(self)
+
+    def write(self, path: str | os.PathLike) -> None:
+        """Write that line to a file, whole or not at all. Raises PartGraphError."""
+        from .files import write
+
+        write(self, path)
 
     @property
     def leaves(self) -> Cuboids:

@@ -1,0 +1,292 @@
+"""Extract programs from part graphs:   python -m data_scripts.extract_programs INPUT --out FOLDER
+
+INPUT is a folder or zip archive of StructureNet's JSON part graphs, thousands of them. In FOLDER, afterwards:
+
+    programs/NAME.txt    the accepted programs
+    rejected.json        name -> reason, detail and F-score (percent) of the others
+    summary.json         how many, why not, and the mean F-score of the accepted ones
+    journal.jsonl        what is finished: a killed run goes on from there with the same command
+
+The files are the same, byte by byte, whatever the number of workers and however often the run was interrupted.
+"""
+
+import argparse
+import hashlib
+import json
+import math
+import sys
+import time
+import warnings
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+import torch
+from joblib import Parallel, delayed, parallel_config
+from tqdm import tqdm
+
+from data_scripts.journal import Journal, write_whole
+from lib.datasets import CATEGORIES, REPOSITORY, DataError
+from lib.extractor import PartGraph, PartGraphError, extract_many
+from lib.extractor.errors import PartGraphWarning
+from lib.extractor.files import load, sources
+
+CHUNK = 32  # files a worker takes at once; fixed, because a batch of shapes is executed together
+LONGEST_NAME = 250  # bytes of a file or folder name
+CODE = ("extractor", "interpreters", "metrics")  # parts of lib whose change makes other programs
+FOLDERS = {f"{name}{end}": name for name in CATEGORIES for end in ("", "_hier")} | {
+    "storagefurniture": "storage",
+    "storagefurniture_hier": "storage",
+}
+OWN_DATA = """\
+with PartNet's shapes:
+  Part graphs of PartNet come with StructureNet (https://github.com/daerduoCarey/structurenet; Mo et al. 2019) to
+  those who accept PartNet's and ShapeNet's licence terms, which stay between you and them; nothing is fetched here.
+  Unpack the folders {chair,table,storagefurniture}_hier below data/partnet, so that there is
+      data/partnet/chair_hier/43875.json          one line of JSON for each shape
+  and run
+      python -m data_scripts.extract_programs data/partnet/chair_hier --out data/extracted/chair
+without them:
+      python -m data_scripts.make_furniture --category chair --count 500
+      python -m data_scripts.extract_programs data/furniture/chair --out data/extracted/chair
+on a cluster:
+  pip install "shape-programs[cluster]", then --scheduler tcp://HOST:8786 of a running Dask cluster whose workers
+  have this repository installed and see INPUT under the same path.
+"""
+
+
+def fingerprints(source: Path, category: str | None) -> dict[str, str]:
+    """For each part graph of a folder or archive, by name: its category, size in bytes and CRC-32, as one text.
+
+    Raises PartGraphError for what is neither folder nor archive, and DataError where a category is neither given nor
+    told by a folder's name.
+    """
+    names = sources(source)
+    archive = None if source.is_dir() else zipfile.ZipFile(source)
+    found = {}
+    for name in names:
+        told = category or category_of(source, name)
+        if archive:
+            info = archive.getinfo(f"{name}.json")
+            found[name] = f"{told} {info.file_size} {info.CRC:08x}"
+        else:
+            found[name] = f"{told} {_size_and_checksum(source / f'{name}.json')}"
+    return found
+
+
+def _size_and_checksum(path: Path) -> str:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        return f"unreadable {error.strerror}"
+    return f"{len(content)} {zlib.crc32(content):08x}"
+
+
+def category_of(source: Path, name: str) -> str:
+    """The category that the innermost telling folder names: chair, chair_hier, storagefurniture_hier, …"""
+    folders = [source.resolve().stem, *PurePosixPath(name).parts[:-1]]
+    for folder in reversed(folders):
+        if told := FOLDERS.get(folder.lower()):
+            return told
+    raise DataError(
+        f"no folder's name tells the category of {name}; give --category, one of {', '.join(CATEGORIES)}"
+    )
+
+
+def extract_chunk(source: Path, chunk: dict[str, str], keep_rejected: bool) -> list[dict]:
+    """One row for the journal for each file of the chunk, name -> fingerprint. Never raises for a bad file."""
+    torch.set_num_threads(1)  # the processes share the cores; and sums come in the same order everywhere
+    graphs, outcomes = {}, {}
+    for name, fingerprint in chunk.items():
+        try:
+            graphs[name] = _load(source, name, fingerprint.split()[0])
+        except Exception as error:  # whatever one file does, the others go on
+            outcomes[name] = _failure(error)
+    outcomes |= zip(graphs, _extract(list(graphs.values()), keep_rejected))
+    return [{"name": name, "source": chunk[name], **outcomes[name]} for name in chunk]
+
+
+def _load(source: Path, name: str, category: str) -> PartGraph:
+    parts = name.split("/")
+    if (
+        not all(parts)
+        or ".." in parts
+        or max(len(part.encode(errors="replace")) for part in parts) > LONGEST_NAME
+    ):
+        raise PartGraphError("its name cannot be the name of a program's file")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PartGraphWarning)  # thousands of files, each with odd labels
+        try:
+            return load(source, name, category)
+        except PartGraphError as error:
+            raise error.in_file(
+                ""
+            ) from None  # the row has the name already; the folder differs between machines
+
+
+def _extract(graphs: list[PartGraph], keep_rejected: bool) -> list[dict]:
+    """Outcomes of several graphs together or, should that fail, of each alone."""
+    try:
+        return [_outcome(extraction, keep_rejected) for extraction in extract_many(graphs)]
+    except Exception as error:
+        if len(graphs) == 1:
+            return [_failure(error)]
+        return [outcome for graph in graphs for outcome in _extract([graph], keep_rejected)]
+
+
+def _outcome(extraction, keep_rejected: bool) -> dict:
+    score = extraction.f_score
+    kept = extraction.program is not None and (extraction.accepted or keep_rejected)
+    return {
+        "accepted": extraction.accepted,
+        "reason": extraction.reason,
+        "detail": extraction.detail,
+        "f_score": round(float(score), 2) if score is not None and math.isfinite(score) else None,
+        "program": extraction.program.to_text() if kept else None,
+    }
+
+
+def _failure(error: Exception) -> dict:
+    what = str(error) if isinstance(error, PartGraphError) else f"{type(error).__name__}: {error}"
+    return {"accepted": False, "reason": "error", "detail": what, "f_score": None, "program": None}
+
+
+@contextmanager
+def workers(count: int, scheduler: str | None) -> Iterator[None]:
+    """Where chunks are worked on: `count` processes (-1: one for each core), or a running Dask cluster.
+
+    Raises DataError for a cluster that is not there.
+    """
+    if scheduler is None:
+        with parallel_config("loky", n_jobs=count):
+            yield
+        return
+    try:
+        from distributed import Client  # optional: pip install "shape-programs[cluster]"
+    except ImportError as error:
+        raise DataError(f'--scheduler needs Dask: pip install "shape-programs[cluster]" ({error})') from error
+    try:
+        client = Client(scheduler, timeout=10)
+    except (OSError, ValueError) as error:
+        raise DataError(f"no Dask scheduler answers at {scheduler} ({error})") from error
+    with client, parallel_config("dask", n_jobs=-1):
+        yield
+
+
+def extract_all(options: argparse.Namespace) -> tuple[list[dict], int]:
+    """All rows, sorted by name, and how many of them were made now. Raises DataError and PartGraphError."""
+    found = fingerprints(options.input, options.category)
+    if not found:
+        raise DataError(f"there are no .json files in {options.input}")
+    if (options.out / "programs").exists() and not (options.out / "journal.jsonl").exists():
+        raise DataError(f"{options.out} holds programs of something else; choose another --out")
+    journal = Journal(options.out / "journal.jsonl", settings(options))
+    journal.check(found)
+    for row in journal.rows.values():
+        keep_program(options.out, row)
+    names = list(found)
+    chunks = [{name: found[name] for name in names[k : k + CHUNK]} for k in range(0, len(names), CHUNK)]
+    chunks = [chunk for chunk in chunks if not journal.rows.keys() >= chunk.keys()]
+    count = sum(map(len, chunks))
+    source = options.input.resolve()  # a worker may have another working folder
+    with tqdm(desc="extracting", unit=" shapes", total=len(found), initial=len(found) - count) as bar:
+        with workers(options.workers, options.scheduler):
+            jobs = (delayed(extract_chunk)(source, chunk, options.keep_rejected) for chunk in chunks)
+            for rows in Parallel(return_as="generator_unordered", batch_size=1)(jobs):
+                journal.add(rows)
+                for row in rows:
+                    keep_program(options.out, row)
+                bar.update(len(rows))
+    journal.finish()
+    return list(journal.rows.values()), count
+
+
+def settings(options: argparse.Namespace) -> dict[str, str]:
+    """What, beside the files, decides what comes out."""
+    code = hashlib.sha256()
+    for path in sorted(path for part in CODE for path in (REPOSITORY / "lib" / part).rglob("*.py")):
+        code.update(path.read_bytes())
+    return {
+        "category": options.category or "by folder",
+        "keep_rejected": str(options.keep_rejected),
+        "code": code.hexdigest()[:12],
+    }
+
+
+def keep_program(out: Path, row: dict) -> None:
+    """Write the row's program, if it has one, to its place."""
+    if row["program"] is not None:
+        folder = "programs" if row["accepted"] else "rejected"
+        write_whole(out / folder / f"{row['name']}.txt", row["program"].encode())
+
+
+def report(out: Path, rows: list[dict]) -> dict:
+    """Write rejected.json and summary.json; returns the latter's content."""
+    rejected = [row for row in rows if not row["accepted"]]
+    scores = [row["f_score"] for row in rows if row["accepted"] and row["f_score"] is not None]
+    counts = Counter(row["reason"] for row in rejected)
+    summary = {
+        "shapes": len(rows),
+        "accepted": len(rows) - len(rejected),
+        "mean_f_score": round(sum(scores) / len(scores), 2) if scores else None,
+        "rejected": dict(sorted(counts.items())),
+    }
+    table = {row["name"]: {key: row[key] for key in ("reason", "detail", "f_score")} for row in rejected}
+    for name, content in (("rejected", table), ("summary", summary)):
+        write_whole(out / f"{name}.json", (json.dumps(content, indent=2) + "\n").encode())
+    return summary
+
+
+def run(options: argparse.Namespace) -> int:
+    """Extract, report, say so in one line; returns the exit code. Raises DataError and PartGraphError."""
+    started = time.monotonic()
+    rows, count = extract_all(options)
+    speed = count / (time.monotonic() - started)
+    summary = report(options.out, rows)
+    if all(row["reason"] == "error" for row in rows):
+        raise DataError(
+            f"none of {len(rows)} files gave a part graph; {rows[0]['name']}: {rows[0]['detail']}"
+        )
+    mean = f"mean F-score {summary['mean_f_score']}" if summary["mean_f_score"] is not None else "no F-score"
+    print(
+        f"{summary['accepted']} of {len(rows)} accepted ({summary['accepted'] / len(rows):.1%}), {mean}, "
+        f"{count} extracted now at {speed:.1f} shapes/s; kept in {options.out}"
+    )
+    return 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command; returns the exit code: 0 finished, 1 bad input, 130 interrupted. Problems are one line on stderr."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=OWN_DATA, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("input", type=Path, metavar="INPUT", help="folder or .zip of JSON part graphs")
+    parser.add_argument("--out", type=Path, required=True, help="where to keep the results")
+    parser.add_argument("--category", choices=CATEGORIES, help="default: told by the folder, e.g. chair_hier")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--workers", type=int, default=-1, help="processes (default: one for each core)")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="use this Dask cluster, e.g. tcp://HOST:8786")
+    parser.add_argument(
+        "--keep-rejected", action="store_true", help="write rejected programs, where there are, to rejected/"
+    )
+    options = parser.parse_args(arguments)
+    if options.workers < 1 and options.workers != -1:
+        parser.error("--workers must be 1 or more")
+    try:
+        return run(options)
+    except (DataError, PartGraphError) as error:
+        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"could not write to {options.out}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted; the same command goes on from here", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

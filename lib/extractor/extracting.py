@@ -1,0 +1,181 @@
+"""The whole way from a part graph to a program: the stages in their order, and what comes out.
+
+    graph --regularise--> graph --survey--> facts about every block --write_program--> program --validate--> accepted?
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+
+from ..interpreters.shapeassembly import Program, ProgramError, execute_many
+from .arranging import collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers, LEVELS
+from .bounding import refit, seen_from
+from .contacts import BOTTOM, TOP, find_contacts
+from .errors import RejectedError
+from .labels import RANKED
+from .ordering import AS_GOOD, grounded_order
+from .partgraph import Part, PartGraph, stack
+from .placing import judge, ways_to_place
+from .shortening import shorten
+from .snapping import is_upright, rename_axes, snap, snap_leaves
+from .subprograms import join_components
+from .symmetry import find_groups
+from .validating import check_program, judge_shape
+from .writing import BlockFacts, write_program
+
+
+@dataclass(frozen=True)
+class Options:
+    """What an extraction may leave out: the ablations of the paper's Table 3, and rejected programs for study."""
+
+    canonical_order: bool = True  # False: cuboids and attachments in an arbitrary (but grounded) order
+    aligned_flag: bool = True  # False: no cuboid is marked as aligned
+    macros: bool = True  # False: no squeeze, reflect or translate
+    hierarchy: bool = True  # False: all leaves in one block
+    keep_rejected: bool = False  # True: programs that fail validation are handed out, with their reason
+
+
+@dataclass(frozen=True, eq=False)
+class Extraction:
+    """What became of one part graph.
+
+    program  None if rejected (unless Options.keep_rejected)
+    reason   "" if accepted, else one of REASONS;  detail says more
+    f_score  percent, of the executed program against the part graph; None if there was nothing to execute
+    graph    the part graph after all rearranging;  facts  what was found out about its blocks
+    """
+
+    program: Program | None
+    reason: str = ""
+    detail: str = ""
+    f_score: float | None = None
+    graph: PartGraph | None = None
+    facts: BlockFacts | None = None
+
+    @property
+    def accepted(self) -> bool:
+        return not self.reason
+
+
+def stages(graph: PartGraph, options: Options = Options()) -> list[tuple[str, PartGraph]]:
+    """The part graph after each step of rearranging it, by name, the input first: for looking at."""
+    steps = [without_slivers, collapse, flatten, hold, snap_leaves, shorten, shorten_chains, limit_levels, refit]
+    if not options.hierarchy:
+        steps.insert(steps.index(hold) + 1, flat)
+    graphs = [("input", graph), ("in_order", in_order(graph))]
+    for step in steps:
+        graphs.append((step.__name__, step(graphs[-1][1])))
+    return graphs
+
+
+def regularise(graph: PartGraph, options: Options = Options()) -> PartGraph:
+    """The part graph after all steps. Raises RejectedError when no part is left."""
+    return stages(graph, options)[-1][1]
+
+
+def in_order(graph: PartGraph) -> PartGraph:
+    """Siblings in an order that depends on what they are, not on how the file lists them."""
+
+    def visit(part: Part) -> tuple[tuple, Part]:
+        pairs = sorted((visit(child) for child in part.children), key=lambda pair: pair[0])
+        numbers = (*part.box.center.tolist(), *part.box.size.tolist(), *part.box.axes.flatten().tolist())
+        key = (part.label, numbers, tuple(key for key, _ in pairs))
+        return key, replace(part, children=tuple(child for _, child in pairs))
+
+    return graph.with_root(visit(graph.root)[1])
+
+
+def semantic_order(parts: list[Part], category: str, size) -> list[Part]:
+    """By the label's rank, then by where the part's center is: first coarsely, then exactly (paper, section 5.2)."""
+    ranks = {label: rank for rank, label in enumerate(RANKED.get(category, ()))}
+
+    def key(part: Part) -> tuple:
+        center = [round(x, 6) + 0.0 for x in part.box.center.tolist()]
+        coarse = [round(2 * x / float(size.max())) for x in center]
+        return ranks.get(part.label, len(ranks)), sum(coarse), *coarse, *center, *part.box.size.tolist()
+
+    return sorted(parts, key=key)
+
+
+def survey(node: Part, category: str, options: Options = Options(), level: int = 1) -> BlockFacts:
+    """All facts about a node's block and, through it, about those below. Raises RejectedError."""
+    size = node.box.size
+    facts = look([seen_from(node.box, child) for child in node.children], size, category, options)
+    if options.macros and level < LEVELS:
+        joined = join_components(list(facts.parts), facts.boxes, list(facts.contacts), size)
+        if len(joined) != len(facts.parts):
+            facts = look([seen_from_same(part) for part in joined], size, category, options)
+    if options.macros:
+        facts = replace(facts, groups=tuple(find_groups(list(facts.parts), facts.boxes, list(facts.contacts), size)))
+    facts = replace(facts, ways=tuple(place(facts, options)))
+    inner = {
+        i: survey(facts.parts[i], category, options, level + 1) for i in facts.written if facts.parts[i].children
+    }
+    return replace(facts, inner=inner)
+
+
+def seen_from_same(part: Part) -> Part:
+    """A part whose frame stays; only its axes are named anew."""
+    return replace(part, box=rename_axes(part.box[None])[0])
+
+
+def look(parts: list[Part], size, category: str, options: Options) -> BlockFacts:
+    """Parts of a block in order, their straightened boxes and their contacts."""
+    parts = semantic_order(parts, category, size)
+    boxes = snap(stack(parts))
+    aligned = is_upright(boxes)
+    if not options.aligned_flag:
+        aligned = torch.zeros_like(aligned)
+    return BlockFacts(tuple(parts), boxes, aligned, size, tuple(find_contacts(boxes, size)))
+
+
+def place(facts: BlockFacts, options: Options):
+    """How each written part is held, in grounded order. Raises RejectedError ("disconnected")."""
+    written, standing = facts.written, {BOTTOM, TOP, *facts.written}
+    contacts = [c for c in facts.contacts if c.first in standing and c.second in standing]
+    ways = [way for i in written for way in ways_to_place(i, contacts, options.macros)]
+    misfits = judge(ways, facts.boxes, facts.aligned, facts.size).tolist()
+    own = {i: [] for i in written}
+    for way, misfit in zip(ways, misfits):
+        own[way.cuboid].append(replace(way, misfit=misfit))
+    tolerance = AS_GOOD * float(facts.size.norm())
+    return grounded_order(own, tolerance, facts.aligned.tolist(), lambda i: facts.parts[i].label)
+
+
+def extract(graph: PartGraph, options: Options = Options()) -> Extraction:
+    """One part graph to a program; see Extraction."""
+    return extract_many([graph], options)[0]
+
+
+def extract_many(graphs: Sequence[PartGraph], options: Options = Options()) -> list[Extraction]:
+    """Many part graphs, in order; their programs are executed as one batch. Never raises for what a graph holds."""
+    written = [_written(graph, options) for graph in graphs]
+    runnable = [i for i, extraction in enumerate(written) if extraction.program is not None]
+    shapes = execute_many([written[i].program for i in runnable])
+    valid = shapes.valid.tolist()
+    for row, i in enumerate(runnable):
+        if not valid[row]:
+            written[i] = replace(written[i], reason="not finite", detail="its geometry cannot be computed")
+        elif not written[i].reason:
+            reason, detail, f_score = judge_shape(shapes[row], graphs[i])
+            written[i] = replace(written[i], reason=reason, detail=detail, f_score=f_score)
+    return [
+        extraction if extraction.accepted or options.keep_rejected else replace(extraction, program=None)
+        for extraction in written
+    ]
+
+
+def _written(graph: PartGraph, options: Options) -> Extraction:
+    """The program of one graph, not yet executed."""
+    regular = facts = None
+    try:
+        regular = regularise(graph, options)
+        facts = survey(regular.root, graph.category, options)
+        program = write_program(facts)
+        check_program(program)
+        return Extraction(program, graph=regular, facts=facts)
+    except RejectedError as error:
+        return Extraction(None, error.reason, error.detail, graph=regular, facts=facts)
+    except ProgramError as error:
+        return Extraction(None, "not a program", str(error), graph=regular, facts=facts)

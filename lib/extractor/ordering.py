@@ -1,0 +1,66 @@
+"""Stage 10: which attachment comes when (paper, section 5.2).
+
+An order is *grounded*: it starts from the bounding box, and a cuboid is only ever attached to what already stands.
+Of all grounded orders those are wanted that lose nothing: every cuboid is placed in the best of its ways. More
+partners standing never makes a cuboid's best way worse, so a cuboid whose best way is already open can be placed at
+once, without shutting any better order out: no enumeration of orders is needed. Where no such cuboid is left, every
+order loses something, and the one that loses least goes on.
+
+Ties are broken as the paper breaks them: by the parts' semantic order, then attachments to aligned cuboids, then
+attachments at face centers.
+"""
+
+from collections.abc import Callable
+
+from .contacts import BOTTOM, TOP
+from .errors import RejectedError
+from .placing import Way
+
+AS_GOOD = 0.004  # misfits that differ by less than this share of the block's diagonal are as good as each other
+
+
+def grounded_order(
+    ways: dict[int, list[Way]],
+    tolerance: float,
+    aligned: list[bool],
+    name: Callable[[int], str] = str,
+) -> list[Way]:
+    """One way for each cuboid, in an order in which each only needs what came before.
+
+    ways       for each cuboid (a number, in semantic order) all its ways, judged
+    tolerance  misfits are compared in steps of this size
+    Raises RejectedError ("disconnected") when some cuboids have no chain of contacts to the bounding box.
+    """
+    keys = {id(way): _preference(way, tolerance, aligned) for own in ways.values() for way in own}
+    best_first = {cuboid: sorted(own, key=lambda way: keys[id(way)]) for cuboid, own in ways.items()}
+    standing, waiting, chosen = {BOTTOM, TOP}, list(ways), []
+    while waiting:
+        possible = []
+        for cuboid in waiting:
+            own = best_first[cuboid]
+            way = next((way for way in own if standing.issuperset(way.partners)), None)
+            if way:
+                possible.append((_loss(keys[id(way)], keys[id(own[0])]), cuboid, way))
+        if not possible:
+            found = f"no chain of contacts holds {', '.join(map(name, waiting))}"
+            raise RejectedError("disconnected", found)
+        _, cuboid, way = min(possible, key=lambda option: option[:2])
+        chosen.append(way)
+        standing.add(cuboid)
+        waiting.remove(cuboid)
+    return chosen
+
+
+def _preference(way: Way, tolerance: float, aligned: list[bool]) -> tuple:
+    """What is better comes first: fit, a macro, more connections, then the paper's ties."""
+    on_tilted = tuple(partner >= 0 and not aligned[partner] for partner in way.partners)
+    return (_steps(way, tolerance), not way.face, -len(way.partners), way.partners, on_tilted, way.kinds, way.points)
+
+
+def _steps(way: Way, tolerance: float) -> int:
+    return int(min(way.misfit / tolerance, 1e6))
+
+
+def _loss(key: tuple, best: tuple) -> tuple:
+    """What is given up by placing a cuboid this way: steps of fit, a macro, a connection."""
+    return tuple(own - wanted for own, wanted in zip(key[:3], best[:3]))

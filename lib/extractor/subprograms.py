@@ -1,0 +1,66 @@
+"""Stage 8a: symmetric sub-assemblies (paper, Appendix C, "Symmetry Detection").
+
+Two legs joined by a bar touch different parts than their mirror images do, so no leg forms a pair by itself. But the
+connected components of parts that all have a mirror image do: each such component becomes an inner part of its own,
+a sub-program, which is then mirrored as a whole.
+"""
+
+from dataclasses import replace
+
+import torch
+from scipy.sparse.csgraph import connected_components
+
+from ..interpreters.cuboids import Cuboids
+from .bounding import enclosing_box, part_leaves
+from .contacts import BOTTOM, TOP, Contact
+from .partgraph import Part, stack
+from .symmetry import mirror_images
+
+
+def join_components(
+    parts: list[Part], boxes: Cuboids, contacts: list[Contact], size, axes: tuple[int, ...] = (0, 2)
+) -> list[Part]:
+    """The block's parts, mirrored components joined into inner parts; the same list if there are none."""
+    for axis in axes:
+        pairs = dict(mirror_images(parts, boxes, axis, size).nonzero().tolist())
+        found = [c for c in _components(list(pairs), contacts) if _same_partners(c, pairs, contacts)]
+        if found:
+            halves = [half for c in found for half in (c, [pairs[i] for i in c])]
+            used = {i for half in halves for i in half}
+            rest = [part for i, part in enumerate(parts) if i not in used]
+            return rest + [join([parts[i] for i in half]) for half in halves]
+    return parts
+
+
+def join(parts: list[Part]) -> Part:
+    """One inner part that holds `parts`, labelled like the first of them."""
+    box = enclosing_box(stack(part_leaves(tuple(parts))))
+    return Part(parts[0].label, box, tuple(parts), parts[0].id)
+
+
+def _components(cuboids: list[int], contacts: list[Contact]) -> list[list[int]]:
+    """Sets of two and more of the cuboids that hang together."""
+    index = {cuboid: k for k, cuboid in enumerate(cuboids)}
+    links = torch.zeros(len(cuboids), len(cuboids))
+    for contact in contacts:
+        if contact.first in index and contact.second in index:
+            links[index[contact.first], index[contact.second]] = 1
+    _, number = connected_components(links.numpy(), directed=False)
+    groups: dict[int, list[int]] = {}
+    for cuboid, group in zip(cuboids, number.tolist()):
+        groups.setdefault(group, []).append(cuboid)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def _same_partners(component: list[int], pairs: dict[int, int], contacts: list[Contact]) -> bool:
+    """Do both halves touch the same other parts, and at least one?"""
+    half, other = set(component), {pairs[i] for i in component}
+    if len(other) < len(half):
+        return False
+    touched = [
+        {contact.partner(i) for contact in contacts for i in (contact.first, contact.second) if i in side}
+        - half
+        - other
+        for side in (half, other)
+    ]
+    return bool(touched[0]) and touched[0] == touched[1]

@@ -1,0 +1,173 @@
+"""Stage 8: which parts of a block are copies of one another (paper, section 5.1 "Symmetry" and Appendix C).
+
+Parts form a group if (i) they touch the same parts, (ii) one is the mirror image of the other, or all are evenly
+spaced, along the x, y or z axis of the block's box, and (iii) so are the places where they touch. Only the first
+member of a group is written down; `reflect` or `translate` makes the others.
+
+The longest rows (three and more members) are taken first, then mirrored pairs about X, Y, Z, then rows of two. For
+(i), members of the group that touch each other do not count: a copy is attached to what its source is attached to.
+Inner parts are compared with all that is in them, as the language would copy it.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from ..interpreters.cuboids import Cuboids
+from ..interpreters.shapeassembly.program import AXES
+from .contacts import BOTTOM, TOP, Contact
+from .partgraph import Part, stack
+
+ALIKE = 0.03  # share of the block's longest side: how far corners of a copy may lie from where they should
+SAME_POINT = 0.1  # the same for the places where copies touch other parts (the authors' program: 0.1 of about 1)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Copies of one part: `members[0]` is written down. `kind` is "reflect" or "translate", `axis` X, Y or Z."""
+
+    kind: str
+    axis: str
+    members: tuple[int, ...]
+    distance: float = 0.0  # of the last member of a row from the first, as a share of the block's side
+
+
+def find_groups(parts: list[Part], boxes: Cuboids, contacts: list[Contact], size: Float[Tensor, "3"]) -> list[Group]:
+    """Groups of a block's parts; `boxes` are their boxes (n), straightened. No part is in two groups."""
+    surroundings = Surroundings(len(parts), contacts, float(size.max()))
+    mirrored = [mirror_images(parts, boxes, axis, size) for axis in range(3)]
+    rows = [row for axis in range(3) for row in find_rows(parts, boxes, axis, size)]
+    candidates = sorted((row for row in rows if len(row.members) > 2), key=lambda row: -len(row.members))
+    candidates += [
+        Group("reflect", AXES[axis], (i, j)) for axis in range(3) for i, j in mirrored[axis].nonzero().tolist()
+    ]
+    candidates += [row for row in rows if len(row.members) == 2]
+    taken: set[int] = set()
+    groups = []
+    for group in candidates:
+        if taken.isdisjoint(group.members) and surroundings.agree(group, boxes):
+            groups.append(group)
+            taken.update(group.members)
+    return groups
+
+
+class Surroundings:
+    """What each part of a block touches, and where."""
+
+    def __init__(self, count: int, contacts: list[Contact], longest: float):
+        self.touched: list[dict[int, Tensor]] = [{} for _ in range(count)]  # partner -> place
+        self.tolerance = SAME_POINT * longest
+        for contact in contacts:
+            place = torch.tensor(contact.point, dtype=torch.float64)
+            for cuboid in (contact.first, contact.second):
+                if cuboid not in (BOTTOM, TOP):
+                    self.touched[cuboid][contact.partner(cuboid)] = place
+
+    def agree(self, group: Group, boxes: Cuboids) -> bool:
+        """Conditions (i) and (iii): all members touch the same parts outside the group, at corresponding places."""
+        members = set(group.members)
+        outside = [{p: w for p, w in self.touched[m].items() if p not in members} for m in group.members]
+        first = outside[0]
+        if not first or any(other.keys() != first.keys() for other in outside[1:]):
+            return False
+        axis = AXES.index(group.axis)
+        for member, other in zip(group.members[1:], outside[1:]):
+            shift = boxes.center[member, axis] - boxes.center[group.members[0], axis]
+            for partner, place in first.items():
+                wanted = place.clone()
+                wanted[axis] = -place[axis] if group.kind == "reflect" else place[axis] + shift
+                if float((wanted - other[partner]).norm()) > self.tolerance:
+                    return False
+        return True
+
+
+def mirror_images(parts: list[Part], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> Bool[Tensor, "n n"]:
+    """[i, j]: part j is what `reflect` makes of part i, and i is the one on the lower side."""
+    tolerance = ALIKE * float(size.max())
+    mirror = torch.ones(3, dtype=torch.float64)
+    mirror[axis] = -1
+    corners = boxes.corners()
+    alike = corner_gap(corners * mirror, corners) <= tolerance
+    lower = boxes.center[:, axis]
+    alike &= (lower[:, None] < -tolerance / 2) & (lower[None] > tolerance / 2)
+    for i, j in alike.nonzero().tolist():
+        alike[i, j] = same_inside(parts[i], parts[j], lambda c: c * mirror, tolerance, turned=True)
+    return alike
+
+
+def find_rows(parts: list[Part], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> list[Group]:
+    """Evenly spaced rows of equal parts along an axis, the longest first where several overlap."""
+    tolerance = ALIKE * float(size.max())
+    along = torch.zeros(3, dtype=torch.float64)
+    along[axis] = 1
+    corners = boxes.corners() - (boxes.center * along).unsqueeze(1)  # all moved to the middle of the axis
+    alike = corner_gap(corners, corners) <= tolerance
+    position = boxes.center[:, axis].tolist()
+    rows, left = [], set(range(len(parts)))
+    for i in sorted(left, key=lambda k: position[k]):
+        if i not in left:
+            continue
+        shelf = [j for j in left if alike[i, j] and same_inside(parts[i], parts[j], _shift(parts[i], parts[j], along), tolerance)]
+        for run in even_runs(sorted(shelf, key=lambda k: position[k]), position, tolerance):
+            distance = (position[run[-1]] - position[run[0]]) / float(size[axis])
+            rows.append(Group("translate", AXES[axis], tuple(run), distance))
+        left -= set(shelf)
+    return rows
+
+
+def _shift(first: Part, second: Part, along: Tensor):
+    step = (second.box.center - first.box.center) * along
+    return lambda corners: corners + step
+
+
+def even_runs(row: list[int], position: list[float], tolerance: float) -> list[list[int]]:
+    """A row of parts cut into evenly spaced runs of at least two, from low to high."""
+    runs, start = [], 0
+    while start < len(row) - 1:
+        stop = start + 2
+        step = position[row[start + 1]] - position[row[start]]
+        while stop < len(row):
+            longer = row[start : stop + 1]
+            step = (position[longer[-1]] - position[longer[0]]) / (len(longer) - 1)
+            off = max(abs(position[part] - position[longer[0]] - k * step) for k, part in enumerate(longer))
+            if off > tolerance:
+                break
+            stop += 1
+        if position[row[start + 1]] - position[row[start]] > tolerance:  # two at one place are no row
+            runs.append(row[start:stop])
+        start = stop
+    return runs
+
+
+def corner_gap(a: Float[Tensor, "n 8 3"], b: Float[Tensor, "m 8 3"]) -> Float[Tensor, "n m"]:
+    """How far the farthest corner of box i of a is from the nearest of box j of b; names of axes do not matter."""
+    return torch.cdist(a.reshape(-1, 3), b.reshape(-1, 3)).view(len(a), 8, len(b), 8).amin(3).amax(1)
+
+
+def same_inside(first: Part, second: Part, image, tolerance: float, turned: bool = False) -> bool:
+    """Is what lies inside `second` the `image` of what lies inside `first`, leaf by leaf? Leaves: always."""
+    if first.is_leaf or second.is_leaf:
+        return first.is_leaf and second.is_leaf
+    copied = stack(first.leaves())
+    if turned:
+        copied = Cuboids(copied.size, torch.stack(_copied_centers(first)), copied.axes)
+    theirs = stack(second.leaves())
+    if len(copied) != len(theirs):
+        return False
+    alike = corner_gap(image(copied.corners()), theirs.corners()) <= tolerance
+    return bool(alike.any(0).all() and alike.any(1).all())
+
+
+def _copied_centers(part: Part) -> list[Tensor]:
+    """Centers of the leaves as the language mirrors them, before mirroring.
+
+    Only a block's own cuboids are mirrored. A filled cuboid in a mirrored block is turned by half a turn instead, so
+    what lies deeper comes out as if it had been reflected through that cuboid's center.
+    """
+    centers = []
+    for child in part.children:
+        for leaf in child.leaves():
+            centers.append(leaf.box.center if child.is_leaf else 2 * child.box.center - leaf.box.center)
+    return centers

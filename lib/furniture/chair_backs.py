@@ -1,0 +1,274 @@
+"""Backs, heads and arms of chairs. A back is made upright behind or on the seat, then leans as a whole."""
+
+import numpy as np
+
+from .kit import Piece, Workshop, group, tilt
+
+
+def leaning(shop: Workshop, frame, piece: Piece) -> Piece:
+    """A back, or what is mounted on it, tilted about the rear edge of the seat."""
+    return tilt(piece, frame.lean, (frame.height, frame.rear)) if frame.lean else piece
+
+
+def slab(shop: Workshop, frame) -> list[Piece]:
+    """One upholstered board that stands on the seat or behind it."""
+    thick, half = shop.between(0.03, 0.06) + 0.25 * max(0, frame.thick - 0.1), frame.width / 2 * shop.between(0.88, 1.0)
+    behind = shop.chance(0.5)
+    bottom = frame.height - frame.thick * shop.between(0.3, 1.0) if behind else frame.height
+    z = (frame.rear - thick, frame.rear) if behind else (frame.rear, frame.rear + thick)
+    board = shop.block("back_single_surface", (-half, half), (bottom, frame.height + frame.back), z)
+    return [group("back_surface", board)]
+
+
+def winged(shop: Workshop, frame) -> list[Piece]:
+    """A middle board between two wings that stand forward."""
+    thick, half, deep = shop.between(0.04, 0.08), frame.width / 2, shop.between(0.1, 0.2)
+    y, wing = (frame.height, frame.height + frame.back), shop.between(0.04, 0.07)
+    middle = shop.block("back_single_surface", (wing - half, half - wing), y, (frame.rear, frame.rear + thick))
+    low = frame.height + frame.back * shop.pick(0.0, shop.between(0.3, 0.5))
+    side = shop.block("back_single_surface", (half - wing, half), (low, y[1] * 0.99), (frame.rear, frame.rear + deep))
+    return [group("back_surface", middle, *shop.both(side))]
+
+
+def cushions(people: int):
+    """Back cushions side by side, with a board behind them."""
+
+    def make(shop: Workshop, frame) -> list[Piece]:
+        thick, board, pitch = shop.between(0.12, 0.18), shop.between(0.04, 0.08), frame.width / people
+        top, half = frame.height + frame.back, frame.width / 2
+        first = shop.block(
+            *("back_single_surface", (-half, pitch - half), (frame.height, top - shop.between(0.0, 0.08))),
+            (frame.rear, frame.rear + thick),
+        )
+        row = shop.row(first, (pitch, 0, 0), people)
+        y = (frame.under, top - shop.between(0.0, 0.05))
+        support = shop.block("back_support", (-half, half), y, (frame.rear - board, frame.rear))
+        return [group("back_surface", *row), support]
+
+    return make
+
+
+def posts(shop: Workshop, frame, low: float = 0.0) -> tuple[list[Piece], float, float]:
+    """Two posts that rise from the rear corners of the seat; also their thickness and the free width between them."""
+    thick, half = shop.between(0.025, 0.042), frame.width / 2
+    behind = shop.chance(0.4)
+    bottom = frame.under if behind else frame.height
+    z = (frame.rear - thick, frame.rear) if behind else (frame.rear, frame.rear + thick)
+    post = shop.block("back_frame_vertical_bar", (half - thick, half), (bottom, frame.height + frame.back), z)
+    return shop.both(post), post.center[2], 2 * (half - thick)
+
+
+def _rail(shop: Workshop, label: str, gap: float, z: float, y: tuple, thick: float = 0.02) -> Piece:
+    return shop.block(label, (-gap / 2, gap / 2), y, (z - thick / 2, z + thick / 2))
+
+
+def ladder(shop: Workshop, frame) -> list[Piece]:
+    """Two posts with slats from side to side between them."""
+    sides, z, gap = posts(shop, frame)
+    count, low = shop.pick(2, 3, 4, 5), frame.height + frame.back * shop.between(0.1, 0.35)
+    pitch = (frame.height + frame.back - low) / count
+    high = pitch * shop.between(0.45, 0.75)
+    top = frame.height + frame.back
+    first = _rail(shop, "back_surface_horizontal_bar", gap, z, (top - high, top))
+    slats = shop.row(first, (0, -pitch, 0), count)
+    return [group("back_surface", *slats), group("back_frame", *sides)]
+
+
+def spindles(shop: Workshop, frame) -> list[Piece]:
+    """Upright bars under a top rail, between posts or without them, down to the seat or to a lower rail."""
+    high, top = shop.between(0.04, 0.09), frame.height + frame.back
+    if shop.chance(0.6):
+        sides, z, gap = posts(shop, frame)
+        rail = _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.025)
+    else:
+        sides, z, gap = [], frame.rear + 0.02, frame.width * shop.between(0.85, 1.0)
+        rail = _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.03)
+    bottom, rails = frame.height, [rail]
+    if sides and shop.chance(0.5):
+        bottom = frame.height + frame.back * shop.between(0.15, 0.3)
+        rails.append(_rail(shop, "back_frame_horizontal_bar", gap, z, (bottom - 0.03, bottom), 0.025))
+    count, thick = shop.pick(2, 3, 4, 5, 6, 7), shop.between(0.014, 0.02)
+    step = gap / (count + 1) if sides else (gap - thick) / (count - 1)
+    x = -step * (count - 1) / 2
+    bar = shop.block(
+        "back_surface_vertical_bar", (x - thick / 2, x + thick / 2), (bottom, top - high), (z - thick / 2, z + thick / 2)
+    )
+    return [group("back_surface", *shop.row(bar, (step, 0, 0), count)), group("back_frame", *sides, *rails)]
+
+
+def splat(shop: Workshop, frame) -> list[Piece]:
+    """One wide upright board in the middle, between posts and under a top rail."""
+    sides, z, gap = posts(shop, frame)
+    high, top, half = shop.between(0.04, 0.08), frame.height + frame.back, gap * shop.between(0.12, 0.25)
+    rail = _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.025)
+    board = shop.block("back_surface_vertical_bar", (-half, half), (frame.height, top - high), (z - 0.008, z + 0.008))
+    return [group("back_surface", board), group("back_frame", *sides, rail)]
+
+
+def cross(shop: Workshop, frame) -> list[Piece]:
+    """Two bars that cross between posts and rails."""
+    sides, z, gap = posts(shop, frame)
+    top, high, thick = frame.height + frame.back, shop.between(0.04, 0.06), shop.between(0.018, 0.028)
+    low = frame.height + frame.back * shop.pick(0.05, 0.25)
+    rails = [
+        _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.025),
+        _rail(shop, "back_frame_horizontal_bar", gap, z, (low, low + 0.03), 0.025),
+    ]
+    start, end = (-gap / 2 + thick, low + 0.03, z), (gap / 2 - thick, top - high, z)
+    bar = shop.beam("back_surface_vertical_bar", start, end, (thick, 0.016))
+    return [group("back_surface", *shop.both(bar)), group("back_frame", *sides, *rails)]
+
+
+def panel_on_posts(shop: Workshop, frame) -> list[Piece]:
+    """A board between, or in front of, two posts, clear of the seat."""
+    sides, z, gap = posts(shop, frame)
+    top, low = frame.height + frame.back, frame.height + frame.back * shop.between(0.15, 0.5)
+    thick = shop.between(0.018, 0.035)
+    board = shop.block("back_single_surface", (-gap / 2, gap / 2), (low, top - shop.between(0, 0.03)), (z - thick / 2, z + thick / 2))
+    return [group("back_surface", board), group("back_frame", *sides)]
+
+
+def framed(shop: Workshop, frame) -> list[Piece]:
+    """A board in a full frame: two posts and two rails."""
+    sides, z, gap = posts(shop, frame)
+    top, high, low = frame.height + frame.back, shop.between(0.03, 0.05), frame.height + frame.back * shop.pick(0.0, 0.2)
+    rails = [
+        _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.028),
+        _rail(shop, "back_frame_horizontal_bar", gap, z, (low, low + high), 0.028),
+    ]
+    board = _rail(shop, "back_single_surface", gap, z, (low + high, top - high), 0.016)
+    return [group("back_surface", board), group("back_frame", *sides, *rails)]
+
+
+def rail(shop: Workshop, frame) -> list[Piece]:
+    """A single rail on two posts."""
+    sides, z, gap = posts(shop, frame)
+    top = frame.height + frame.back
+    surface = _rail(shop, "back_single_surface", gap, z, (top - shop.between(0.05, 0.1), top), 0.025)
+    return [group("back_surface", surface), group("back_frame", *sides)]
+
+
+def panel_on_stem(shop: Workshop, frame) -> list[Piece]:
+    """A board on one or two narrow stems that come from behind the seat."""
+    thick, half, low = shop.between(0.04, 0.07), frame.width / 2 * shop.between(0.75, 1.0), shop.between(0.08, 0.16)
+    top = frame.height + frame.back
+    board = shop.block("back_single_surface", (-half, half), (frame.height + low, top), (frame.rear, frame.rear + thick))
+    y = (frame.under, frame.height + low + shop.between(0.1, 0.5) * (frame.back - low))
+    if shop.chance(0.6):
+        wide = shop.between(0.025, 0.05)
+        stems = [shop.block("back_connector", (-wide, wide), y, (frame.rear - 0.022, frame.rear))]
+    else:
+        stems = shop.both(shop.block("back_connector", (half * 0.45, half * 0.45 + 0.03), y, (frame.rear - 0.022, frame.rear)))
+    return [group("back_surface", board), *stems]
+
+
+WOODEN = (ladder, spindles, spindles, splat, cross, framed, rail)
+
+
+def head(shop: Workshop, frame) -> list[Piece]:
+    """A pad above the back, on it or on two short bars."""
+    gap, half, high = shop.pick(0.0, shop.between(0.03, 0.06)), frame.width * shop.between(0.24, 0.34), shop.between(0.09, 0.15)
+    bottom = frame.height + frame.back + gap
+    z = frame.rear + 0.01
+    pad = shop.block("headrest", (-half, half), (bottom, bottom + high), (z - 0.025, z + 0.035))
+    if not gap:
+        return [pad]
+    bar = shop.block("head_connector", (half * 0.5, half * 0.5 + 0.018), (bottom - gap, bottom), (z - 0.009, z + 0.009))
+    return [pad, *shop.both(bar)]
+
+
+def arms(shop: Workshop, frame) -> list[Piece]:
+    """A pair of arms beside the seat, of bars or as a frame; or one writing tablet."""
+    style = shop.pick(post_arm, two_post_arm, tee_arm, slanted_arm, loop_arm, panel_arm, weights=(4, 2, 2, 2, 1, 1))
+    side = group("chair_arm", *style(shop, frame, shop.between(0.16, 0.24)))
+    if shop.chance(0.06):
+        return [group("chair_arm", *writing_tablet(shop, frame))]
+    return shop.both(side)
+
+
+def _reach(frame, rise: float) -> tuple[float, float]:
+    """From where the leaning back is at a height above the seat, to near the front of the seat (z)."""
+    return frame.rear - rise * np.tan(frame.lean) if frame.back > rise else frame.rear, -frame.rear
+
+
+def _arm_bar(shop: Workshop, frame, rise: float, wide: float, forward: float) -> Piece:
+    back, front = _reach(frame, rise)
+    x = frame.width / 2 - 0.002
+    y = frame.height + rise
+    return shop.block("arm_horizontal_bar", (x, x + wide), (y - 0.025, y), (back, front * forward))
+
+
+def _arm_post(shop: Workshop, frame, rise: float, z: float, wide: float, thick: float) -> Piece:
+    """An upright beside the seat, from its underside to the arm's bar."""
+    x = frame.width / 2 - 0.002
+    return shop.block(
+        "arm_near_vertical_bar", (x, x + wide), (frame.under, frame.height + rise - 0.025), (z - thick / 2, z + thick / 2)
+    )
+
+
+def post_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
+    """A bar from the back to a post near the front."""
+    wide, forward = shop.between(0.03, 0.06), shop.between(0.55, 1.0)
+    z = -frame.rear * forward - 0.03
+    return [_arm_bar(shop, frame, rise, wide, forward), _arm_post(shop, frame, rise, z, wide * 0.8, 0.03)]
+
+
+def two_post_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
+    """A bar on two posts."""
+    wide, forward = shop.between(0.03, 0.06), shop.between(0.7, 1.0)
+    front = _arm_post(shop, frame, rise, -frame.rear * forward - 0.03, wide * 0.8, 0.03)
+    rear = shop.copy(front, (0, 0, frame.rear * (forward + shop.between(0.5, 0.8)) + 0.03))
+    return [_arm_bar(shop, frame, rise, wide, forward), front, rear]
+
+
+def tee_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
+    """A pad on a single post, clear of the back."""
+    wide, half = shop.between(0.05, 0.08), frame.depth * shop.between(0.25, 0.35)
+    x, y = frame.width / 2 - 0.002, frame.height + rise
+    pad = shop.block("arm_horizontal_bar", (x - 0.01, x - 0.01 + wide), (y - 0.03, y), (-half, half))
+    return [pad, _arm_post(shop, frame, rise - 0.005, shop.between(-0.04, 0.03), 0.028, shop.between(0.03, 0.07))]
+
+
+def slanted_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
+    """A bar from the back, held by a slanted post."""
+    wide, forward = shop.between(0.03, 0.055), shop.between(0.75, 1.0)
+    x, z = frame.width / 2 - 0.002 + wide / 2, -frame.rear * forward - 0.03
+    foot = (x, frame.under + 0.005, z - shop.between(0.06, 0.14))
+    post = shop.beam("arm_near_vertical_bar", foot, (x, frame.height + rise - 0.02, z), (wide * 0.8, 0.028))
+    return [_arm_bar(shop, frame, rise, wide, forward), post]
+
+
+def loop_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
+    """A closed loop: two uprights, a bar above and one beside the seat."""
+    pieces = two_post_arm(shop, frame, rise)
+    low = shop.copy(pieces[0])
+    low.label, low.center = "arm_connector", low.center * (1, 0, 1) + (0, frame.under + 0.0125, 0)
+    return [group("arm_holistic_frame", *pieces, low)]
+
+
+def panel_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
+    """A bar on a closed panel."""
+    x, wide, forward = frame.width / 2 - 0.002, shop.between(0.03, 0.05), shop.between(0.7, 1.0)
+    y, z = (frame.under, frame.height + rise - 0.025), (frame.rear, -frame.rear * forward)
+    return [_arm_bar(shop, frame, rise, wide, forward), shop.block("arm_near_vertical_bar", (x, x + 0.022), y, z)]
+
+
+def writing_tablet(shop: Workshop, frame) -> list[Piece]:
+    """A board to write on, at the right hand only."""
+    x, y, front = frame.width / 2 - 0.002, frame.height + 0.22, -frame.rear
+    board = shop.block("arm_writing_table", (-0.02, x + 0.06), (y, y + 0.02), (front - 0.12, front + 0.14))
+    back, _ = _reach(frame, 0.2)
+    bar = shop.block("arm_horizontal_bar", (x, x + 0.04), (y - 0.025, y), (back, front))
+    return [board, bar, _arm_post(shop, frame, 0.22, front - 0.05, 0.03, 0.03)]
+
+
+def sofa_arms(shop: Workshop, frame) -> list[Piece]:
+    """Upholstered blocks at both sides, plain, with a pad on top, or rolled over a panel."""
+    wide, rise = shop.between(0.08, 0.2), shop.between(0.1, min(0.28, max(0.12, frame.back - 0.05)))
+    x, top, bottom = frame.width / 2, frame.height + rise, frame.under * shop.pick(1.0, 1.0, 0.6)
+    z = (frame.rear, -frame.rear - shop.pick(0.0, shop.between(0.0, 0.06)))
+    pad = shop.pick(0.0, shop.between(0.03, 0.06))
+    pieces = [shop.block("arm_sofa_style", (x, x + wide), (bottom, top - pad), z)]
+    if pad:
+        pieces.append(shop.block("arm_horizontal_bar", (x - 0.012, x + wide + 0.01), (top - pad, top), z))
+    return shop.both(group("chair_arm", *pieces))

@@ -1,0 +1,299 @@
+"""Bases of tables. Each function makes the children of a table_base, from the floor to `frame.under`."""
+
+import numpy as np
+
+from .chair_bases import Leg, stretchers
+from .kit import Piece, Workshop, group
+
+
+def corner_legs(shop: Workshop, frame, splay: float = 0.0) -> tuple[Leg, Leg]:
+    """The right front leg and the right back one; `splay`: how far out the feet stand, metres."""
+    thick = shop.between(0.03, 0.08) if frame.width > 0.7 else shop.between(0.022, 0.04)
+    x, z = (half - thick / 2 for half in frame.base)
+    front = Leg((x + splay, 0, z + splay), (x, frame.under, z), thick)
+    return front, Leg((x + splay, 0, -z - splay), (x, frame.under, -z), thick)
+
+
+def legs(shop: Workshop, frame) -> list[Piece]:
+    """Four or six legs, straight or splayed, with or without stretchers and casters."""
+    splay = shop.pick(0.0, shop.between(0.02, 0.1), weights=(2, 1))
+    if splay:
+        frame.overhang += splay * shop.between(0.5, 1)
+    front, back = corner_legs(shop, frame, splay)
+    if not splay and shop.chance(0.1):
+        return _on_casters(shop, front, back)
+    pieces = shop.both(front.build(shop), back.build(shop))
+    if frame.width > 1.6 and shop.chance(0.2):
+        middle = Leg((0, 0, front.foot[2]), (0, frame.under, front.top[2]), front.thick).build(shop)
+        return pieces + shop.row(middle, (0, 0, -front.foot[2] - front.top[2]), 2)
+    style = shop.pick("none", "sides", "H", "box", "front and back", "X", weights=(6, 1, 2, 1.5, 1, 1))
+    return pieces + stretchers(shop, style, front, back)
+
+
+def _on_casters(shop: Workshop, front: Leg, back: Leg) -> list[Piece]:
+    wheels = []
+    for leg in (front, back):
+        leg.foot[1] = 0.07
+        (x, _, z), half = leg.foot, min(leg.thick / 2, 0.02)
+        wheel = shop.block("other", (x - half, x + half), (0, 0.05), (z - 0.025, z + 0.025))
+        fork = shop.block("other", (x - half / 2, x + half / 2), (0.048, 0.07), (z - 0.012, z + 0.012))
+        wheels.append(group("caster", wheel, fork))
+    return shop.both(front.build(shop), back.build(shop), *wheels)
+
+
+def shelf_legs(shop: Workshop, frame) -> list[Piece]:
+    """Four legs with one or two shelves between them."""
+    front, back = corner_legs(shop, frame)
+    x, z = front.foot[0] + front.thick / 2 * shop.pick(0, 0.9), front.foot[2] + front.thick / 2 * 0.5
+    height = frame.under * shop.between(0.15, 0.4)
+    shelf = shop.block("shelf", (-x, x), (height, height + 0.025), (-z, z))
+    pieces = shop.both(front.build(shop), back.build(shop))
+    count = 2 if frame.under > 0.5 and shop.chance(0.3) else 1
+    pieces += shop.row(shelf, (0, (frame.under - height) / 2, 0), count)
+    if shop.chance(0.15):
+        pieces.append(shop.block("back_panel", (-x, x), (height, frame.under), (-z, -z + 0.02)))
+    return pieces
+
+
+def trestle(shop: Workshop, frame) -> list[Piece]:
+    """At each end a column, or two, on a foot and under a beam; one stretcher between them."""
+    x, deep = frame.base[0] * shop.between(0.65, 0.95), frame.base[1] * shop.between(0.75, 1.0)
+    thick, high = shop.between(0.04, 0.08), shop.between(0.04, 0.07)
+    sides = (x - thick / 2, x + thick / 2)
+    end = [shop.block("foot", sides, (0, high), (-deep, deep))]
+    beam = high if shop.chance(0.6) else 0.0
+    if beam:
+        end.append(shop.block("bar_stretcher", sides, (frame.under - high, frame.under), (-deep * 0.9, deep * 0.9)))
+    column_z = shop.pick(0.0, deep * 0.45)
+    column = shop.block("leg", sides, (high, frame.under - beam), (column_z - thick / 2 - 0.02, column_z + thick / 2 + 0.02))
+    end += [column] if not column_z else [column, shop.copy(column, (0, 0, -2 * column_z))]
+    pieces = shop.both(group("leg", *end)) if shop.chance(0.5) else shop.both(*end)
+    y = frame.under * shop.between(0.2, 0.75)
+    inner = x - thick / 2
+    if column_z:  # the stretcher needs something to end in
+        rail = shop.block("bar_stretcher", sides, (y, y + 0.05), (-column_z, column_z))
+        pieces += shop.both(rail)
+    return pieces + [shop.block("bar_stretcher", (-inner, inner), (y - 0.005, y + 0.055), (-0.025, 0.025))]
+
+
+def crossed(shop: Workshop, frame) -> list[Piece]:
+    """At each end two legs that cross, and a bar through the crossings."""
+    x, deep, thick = frame.base[0] * shop.between(0.7, 0.95), frame.base[1] * 0.9, shop.between(0.03, 0.06)
+    outer = shop.beam("leg", (x, 0.01, -deep), (x, frame.under, deep), (thick, thick))
+    inner = shop.beam("leg", (x - thick, 0.01, deep), (x - thick, frame.under, -deep), (thick, thick))
+    y, half = frame.under / 2, x - thick * 1.4
+    bar = shop.block("bar_stretcher", (-half, half), (y - 0.02, y + 0.02), (-0.02, 0.02))
+    return [*shop.both(outer, inner), bar]
+
+
+def pedestal(shop: Workshop, frame) -> list[Piece]:
+    """A column on a plate or on feet that point away from it, sometimes with a plate under the top."""
+    reach, column = min(frame.base) * shop.between(0.55, 0.85), shop.between(0.03, 0.09) * min(1, frame.width)
+    top, pieces, foot = frame.under, [], shop.between(0.025, 0.05)
+    if shop.chance(0.4):
+        plate = reach * shop.between(0.4, 0.8)
+        pieces.append(shop.block("tabletop_connector", (-plate, plate), (top - 0.025, top), (-plate, plate)))
+        top -= 0.025
+    if shop.chance(0.5):
+        pieces.append(shop.block("pedestal", (-reach, reach), (0, foot), (-reach, reach)))
+        return pieces + [shop.block("central_support", (-column, column), (foot, top), (-column, column))]
+    pieces.append(shop.block("central_support", (-column, column), (0.03, top), (-column, column)))
+    return pieces + star_feet(shop, shop.pick(3, 4, 4, 5), (column * 0.8, reach), foot)
+
+
+def star_feet(shop: Workshop, count: int, reach: tuple[float, float], thick: float) -> list[Piece]:
+    """Feet around a column, between two distances from the middle, higher at the inner one."""
+    turn = np.pi / 4 if count == 4 and shop.chance(0.5) else 0.0
+    rise, pieces = shop.pick(0.0, shop.between(0.02, 0.1)), []
+    for angle in turn + np.arange(count) * 2 * np.pi / count:
+        direction = np.array([np.sin(angle), 0.0, -np.cos(angle)])
+        if direction[0] > -1e-9:  # the others are mirror images
+            hub, tip = direction * reach[0] + (0, 0.04 + rise, 0), direction * reach[1] + (0, thick / 2, 0)
+            along = 0 if abs(direction[0]) > abs(direction[2]) + 1e-9 else 2
+            start, end = (hub, tip) if direction[along] > 0 else (tip, hub)
+            foot = shop.beam("foot", start, end, (thick, thick), along)
+            pieces += shop.both(foot) if direction[0] > 1e-9 else [foot]
+    return pieces
+
+
+def two_pedestals(shop: Workshop, frame) -> list[Piece]:
+    """Two columns, each on a plate, perhaps joined."""
+    x, reach, column = frame.base[0] * shop.between(0.55, 0.7), frame.base[1] * 0.7, shop.between(0.04, 0.08)
+    wide = min(reach * shop.between(0.4, 1.0), x * 0.6)
+    plate = shop.block("pedestal", (x - wide, x + wide), (0, 0.04), (-reach, reach))
+    post = shop.block("central_support", (x - column, x + column), (0.04, frame.under), (-column, column))
+    pieces = shop.both(plate, post)
+    if shop.chance(0.5):
+        y = frame.under * shop.between(0.15, 0.5)
+        pieces.append(shop.block("bar_stretcher", (column - x, x - column), (y, y + 0.05), (-0.02, 0.02)))
+    return pieces
+
+
+def panels(shop: Workshop, frame) -> list[Piece]:
+    """Solid sides, with or without a back, a shelf and a divider."""
+    (x, z), thick = frame.base, shop.between(0.022, 0.05)
+    pieces = shop.both(shop.block("vertical_side_panel", (x - thick, x), (0, frame.under), (-z, z)))
+    inner = x - thick
+    if shop.chance(0.6):
+        low = frame.under * shop.pick(0.0, shop.between(0.2, 0.6))
+        place = shop.pick(-z, -0.01)
+        pieces.append(shop.block("back_panel", (-inner, inner), (low, frame.under), (place, place + 0.022)))
+    if shop.chance(0.4):
+        y = frame.under * shop.between(0.1, 0.5)
+        pieces.append(shop.block("shelf", (-inner, inner), (y, y + 0.022), (-z + 0.025, z * shop.between(0.5, 1))))
+        if shop.chance(0.4):
+            pieces.append(shop.block("vertical_divider_panel", (-0.011, 0.011), (y + 0.022, frame.under), (-z + 0.025, z * 0.5)))
+    return pieces
+
+
+def frames(shop: Workshop, frame) -> list[Piece]:
+    """At each end a frame: two legs and a runner, perhaps a bar under the top; an assembly that is mirrored."""
+    (x, z), thick = frame.base, shop.between(0.025, 0.06)
+    sides, shift = (x - thick, x), shop.pick(0.0, shop.between(0.0, 0.2)) * x
+    sides = (sides[0] - shift, sides[1] - shift)
+    upper = thick if shop.chance(0.5) else 0.0
+    front = shop.block("leg", sides, (thick, frame.under - upper), (z - thick, z))
+    end = [front, shop.copy(front, (0, 0, thick - 2 * z)), shop.block("runner", sides, (0, thick), (-z, z))]
+    if upper:
+        end.append(shop.block("bar_stretcher", sides, (frame.under - upper, frame.under), (-z, z)))
+    pieces = shop.both(group("leg", *end)) if shop.chance(0.5) else shop.both(*end)
+    if shop.chance(0.4):
+        pieces.append(shop.block("bar_stretcher", (-sides[0], sides[0]), (0, thick), (-z, thick - z)))
+    return pieces
+
+
+def cube(shop: Workshop, frame) -> list[Piece]:
+    """A solid block, or a box that is open at the front."""
+    x, z = frame.base
+    if shop.chance(0.3):
+        return [shop.block("pedestal", (0.05 - x, x - 0.05), (0, frame.under), (0.05 - z, z - 0.05))]
+    pieces = shop.both(shop.block("vertical_side_panel", (x - 0.03, x), (0, frame.under), (-z, z)))
+    pieces.append(shop.block("bottom_panel", (0.03 - x, x - 0.03), (0.0, 0.03), (-z, z)))
+    if shop.chance(0.5):
+        pieces.append(shop.block("vertical_divider_panel", (-0.015, 0.015), (0.03, frame.under), (-z, z)))
+    return pieces
+
+
+def tripod(shop: Workshop, frame) -> list[Piece]:
+    """Three splayed legs."""
+    thick, reach, splay = shop.between(0.025, 0.045), min(frame.base) * 0.6, shop.between(0.02, 0.1)
+    back = Leg((0, 0, -reach - splay), (0, frame.under, -reach), thick)
+    x, z = 0.87 * reach, 0.5 * reach
+    front = Leg((x + 0.87 * splay, 0, z + 0.5 * splay), (x, frame.under, z), thick)
+    return [back.build(shop), *shop.both(front.build(shop))]
+
+
+def c_frame(shop: Workshop, frame) -> list[Piece]:
+    """A table that reaches over a sofa: the top is carried from one side only."""
+    (x, z), thick = frame.base, shop.between(0.025, 0.04)
+    post = shop.block("leg", (-x, thick - x), (thick, frame.under), (z - thick, z))
+    runner = shop.block("runner", (-x, x), (0, thick), (z - thick, z))
+    back = (0, 0, thick - 2 * z)
+    bar = shop.block("bar_stretcher", (-x, thick - x), (0, thick), (thick - z, z - thick))
+    return [post, shop.copy(post, back), runner, shop.copy(runner, back), bar]
+
+
+def drawer(shop: Workshop, label: str, x: tuple, y: tuple, z: tuple) -> Piece:
+    """A drawer or a door: a body, and a knob or a handle that stands out a little at its front."""
+    middle_x, middle_y, front = sum(x) / 2, sum(y) / 2, max(z)
+    wide, high = shop.pick((0.012, 0.012), (min(0.06, abs(x[1] - x[0]) * 0.3), 0.008))
+    if label == "cabinet_door":  # the handle is far from the hinge, which is at the outer side
+        middle_x -= np.sign(middle_x + 1e-9) * (abs(x[1] - x[0]) / 2 - 0.035)
+        wide, high = high, wide
+    body = shop.block("other", x, y, (min(z), front))
+    handle = shop.block("other", (middle_x - wide, middle_x + wide), (middle_y - high, middle_y + high), (front, front + 0.022))
+    return group(label, body, handle)
+
+
+def _tower(shop: Workshop, frame, outer: float, inner: float) -> list[Piece]:
+    """A box at the right side with drawers in it, or with a door; x from `inner` to `outer`."""
+    z, thick, low = frame.base[1], 0.022, shop.pick(0.0, shop.between(0.04, 0.12))
+    pieces = [
+        shop.block("vertical_side_panel", (outer - thick, outer), (0, frame.under), (-z, z)),
+        shop.block("vertical_side_panel", (inner, inner + thick), (0, frame.under), (-z, z)),
+        shop.block("bottom_panel", (inner + thick, outer - thick), (low, low + thick), (-z, z)),
+    ]
+    x, bottom, style = (inner + thick + 0.003, outer - thick - 0.003), low + thick, shop.pick("drawers", "door", weights=(3, 1))
+    if style == "door":
+        return pieces + [drawer(shop, "cabinet_door", x, (bottom + 0.003, frame.under - 0.003), (z - 0.02, z))]
+    count = shop.pick(2, 3, 4)
+    pitch = (frame.under - bottom) / count
+    first = drawer(shop, "drawer", x, (bottom + 0.003, bottom + pitch - 0.003), (-z * 0.9, z))
+    return pieces + shop.row(first, (0, pitch, 0), count)
+
+
+def drawer_towers(shop: Workshop, frame) -> list[Piece]:
+    """A box with drawers at either side, mirrored as a whole, and often a panel behind the legs."""
+    x, z = frame.base
+    inner = x - shop.between(0.3, 0.42)
+    pieces = shop.both(*_tower(shop, frame, x, inner))
+    if shop.chance(0.6):
+        pieces.append(_modesty_panel(shop, frame, -inner, inner, -z))
+    if shop.chance(0.3):
+        y = (frame.under - shop.between(0.08, 0.12), frame.under)
+        pieces.append(drawer(shop, "drawer", (0.003 - inner, inner - 0.003), y, (-z * 0.6, z)))
+    return pieces
+
+
+def _modesty_panel(shop: Workshop, frame, left: float, right: float, z: float) -> Piece:
+    low = frame.under * shop.pick(0.0, shop.between(0.3, 0.6))
+    return shop.block("back_panel", (left, right), (low, frame.under), (z, z + 0.02))
+
+
+def one_tower(shop: Workshop, frame) -> list[Piece]:
+    """A box with drawers at one side; legs or a panel at the other."""
+    x, z = frame.base
+    inner = x - shop.between(0.32, 0.48)
+    pieces = _tower(shop, frame, x, inner)
+    if shop.chance(0.5):
+        pieces = [shop.copy(piece, mirrored=True) for piece in pieces]
+        side = 1.0
+    else:
+        side = -1.0
+    if shop.chance(0.5):
+        pieces.append(shop.block("vertical_side_panel", (side * x, side * (x - 0.025)), (0, frame.under), (-z, z)))
+        if shop.chance(0.6):
+            pieces.append(_modesty_panel(shop, frame, *sorted((side * (x - 0.025), -side * inner)), -z))
+        return pieces
+    thick = shop.between(0.03, 0.05)
+    leg = shop.block("leg", (side * x, side * (x - thick)), (0, frame.under), (z - thick, z))
+    return pieces + [leg, shop.copy(leg, (0, 0, thick - 2 * z))]
+
+
+def drawer_box(shop: Workshop, frame) -> list[Piece]:
+    """Four legs under a box with one to three drawers side by side."""
+    high, thick = shop.between(0.09, 0.16), 0.02
+    front, back = corner_legs(shop, frame)
+    bottom = frame.under - high
+    if shop.chance(0.7):  # legs run up to the top, outside the box
+        x, z = front.top[0] - front.thick / 2, front.top[2] + front.thick / 2
+    else:
+        x, z = front.top[0] + front.thick / 2, front.top[2] + front.thick / 2
+        front.top[1] = back.top[1] = bottom
+    pieces = shop.both(front.build(shop), back.build(shop))
+    pieces += shop.both(shop.block("vertical_side_panel", (x - thick, x), (bottom, frame.under), (-z, z)))
+    pieces.append(shop.block("back_panel", (thick - x, x - thick), (bottom, frame.under), (-z, thick - z)))
+    count, inner = (1 if frame.width < 0.7 else shop.pick(1, 2, 3)), x - thick
+    pitch = 2 * inner / count
+    slot = (-inner + 0.003, -inner + pitch - 0.003)
+    first = drawer(shop, "drawer", slot, (bottom + 0.003, frame.under - 0.002), (thick - z + 0.004, z))
+    pieces += shop.row(first, (pitch, 0, 0), count)
+    if shop.chance(0.3):
+        y = bottom * shop.between(0.15, 0.4)
+        pieces.append(shop.block("shelf", (-x, x), (y, y + 0.022), (-z, z)))
+    return pieces
+
+
+def keyboard_desk(shop: Workshop, frame) -> list[Piece]:
+    """Solid sides, a panel behind the legs and a tray under the top."""
+    (x, z), thick = frame.base, 0.025
+    pieces = shop.both(shop.block("vertical_side_panel", (x - thick, x), (0, frame.under), (-z, z)))
+    pieces.append(_modesty_panel(shop, frame, thick - x, x - thick, -z))
+    low = frame.under - shop.between(0.1, 0.14)
+    half = x - thick - 0.003
+    tray = shop.block("other", (-half, half), (low, low + 0.02), (-z * 0.2, z * 0.95))
+    slide = shop.block("other", (half - 0.02, half), (low + 0.02, low + 0.04), (-z * 0.2, z * 0.9))
+    pieces.append(group("keyboard_tray", tray, *shop.both(slide)))
+    if shop.chance(0.5):
+        pieces.append(shop.block("shelf", (thick - x, x - thick), (0.08, 0.1), (-z, 0)))
+    return pieces

@@ -30,7 +30,7 @@ from tqdm import tqdm
 
 from data_scripts.journal import Journal, write_whole
 from lib.datasets import CATEGORIES, REPOSITORY, DataError
-from lib.extractor import PartGraph, PartGraphError, extract_many
+from lib.extractor import Extraction, Options, PartGraph, PartGraphError, extract_many
 from lib.extractor.errors import PartGraphWarning
 from lib.extractor.files import load, sources
 
@@ -130,22 +130,23 @@ def _load(source: Path, name: str, category: str) -> PartGraph:
 def _extract(graphs: list[PartGraph], keep_rejected: bool) -> list[dict]:
     """Outcomes of several graphs together or, should that fail, of each alone."""
     try:
-        return [_outcome(extraction, keep_rejected) for extraction in extract_many(graphs)]
+        return [
+            _outcome(extraction) for extraction in extract_many(graphs, Options(keep_rejected=keep_rejected))
+        ]
     except Exception as error:
         if len(graphs) == 1:
             return [_failure(error)]
         return [outcome for graph in graphs for outcome in _extract([graph], keep_rejected)]
 
 
-def _outcome(extraction, keep_rejected: bool) -> dict:
+def _outcome(extraction: Extraction) -> dict:
     score = extraction.f_score
-    kept = extraction.program is not None and (extraction.accepted or keep_rejected)
     return {
         "accepted": extraction.accepted,
         "reason": extraction.reason,
         "detail": extraction.detail,
         "f_score": round(float(score), 2) if score is not None and math.isfinite(score) else None,
-        "program": extraction.program.to_text() if kept else None,
+        "program": extraction.program.to_text() if extraction.program else None,
     }
 
 

@@ -5,24 +5,27 @@ of the two. Whether they do, and the polytope they share, follow from geometry: 
 corners of the polytope, which are corners of one box inside the other and edges of one cut by faces of the other.
 
     where they touch, in this order:   the center of a face that lies against the opposite face of the other
-                                       the center of a face of the first, or else of the second, that lies in the other
+                                       the center of a face that lies in the other
                                        the middle of the shared polytope
+    of several, the one nearest to that middle; so it does not matter which of the two is named first
 
 The block's bounding box takes part as two more boxes, its top and its bottom face. (The authors sample 20^3 points a
 cuboid, join points nearer than 5 % of the longest side, and average up to 50^3 more.)
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from ..interpreters.cuboids import Cuboids, concatenate, cross
 from .snapping import UPRIGHT
 
 REACH = 0.02  # share of the longest side of the two boxes: how far apart they may be
-BBOX_REACH = 0.03  # share of the block's height: how far from its top or bottom a cuboid may end
+BBOX_REACH = 0.05  # share of the block's height: how far from its top or bottom a cuboid may end
+WIDER = (1, 2, 4)  # times the reach, tried in turn while a block falls apart
+AS_NEAR = 0.1  # share of the reach by which a preferred place may miss the other box more than the middle does
 BOTTOM, TOP = -2, -1  # the bounding box's faces, as partners
 
 # local coordinates of the centers of the faces left, right, bottom, top, back, front
@@ -30,15 +33,16 @@ FACE_CENTERS = torch.full((6, 3), 0.5, dtype=torch.float64)
 FACE_CENTERS[torch.arange(6), torch.arange(6) // 2] = (torch.arange(6) % 2).double()
 # corner numbers (order of `Cuboids.corners`) of the two ends of each of the twelve edges
 _EDGES = torch.tensor([[i, j] for i in range(8) for j in range(i + 1, 8) if (i ^ j) in (1, 2, 4)])
-MIDDLE = 3
+FACE_TO_FACE, IN_FACE, MIDDLE = 0, 1, 2  # the better a place, the lower
 
 
 @dataclass(frozen=True)
 class Contact:
     """Cuboids `first` and `second` touch; `second` may be BOTTOM or TOP. Points are local, in [0, 1]^3.
 
-    kind   0 face against face, 1 a face center of `first`, 2 one of `second`, 3 the middle of what they share
+    kind   FACE_TO_FACE, IN_FACE (a face center of one lies in the other) or MIDDLE (of what they share)
     point  the same place in the block's frame
+    firm   False if the boxes of inner parts touch, but nothing that is in them does
     """
 
     first: int
@@ -47,6 +51,7 @@ class Contact:
     at_second: tuple[float, float, float]
     kind: int
     point: tuple[float, float, float]
+    firm: bool = True
 
     def partner(self, cuboid: int) -> int:
         return self.second if cuboid == self.first else self.first
@@ -56,14 +61,39 @@ class Contact:
         return self.at_first if cuboid == self.first else self.at_second
 
 
-def find_contacts(boxes: Cuboids, size: Float[Tensor, "3"], reach: float = REACH) -> list[Contact]:
+def connecting_contacts(boxes: Cuboids, size: Float[Tensor, "3"]) -> list[Contact]:
+    """The contacts of a block; where they leave parts without a hold, those within a wider reach.
+
+    A block is a part of something: its own parts may hang together only through what is around it, such as four legs
+    of slightly different length. What floats in the end is found when the whole shape is validated.
+    """
+    for wider in WIDER:
+        contacts = find_contacts(boxes, size, wider * REACH, wider * BBOX_REACH)
+        if wider == WIDER[-1] or not floating(len(boxes), contacts):
+            return contacts
+
+
+def floating(count: int, contacts: list[Contact]) -> set[int]:
+    """The cuboids that no chain of contacts joins to the bounding box."""
+    reached, found = {BOTTOM, TOP}, True
+    while found:
+        found = {
+            i for c in contacts for i in (c.first, c.second) if c.partner(i) in reached and i not in reached
+        }
+        reached |= found
+    return set(range(count)) - reached
+
+
+def find_contacts(
+    boxes: Cuboids, size: Float[Tensor, "3"], reach: float = REACH, bbox_reach: float = BBOX_REACH
+) -> list[Contact]:
     """All contacts between the cuboids (n) of a block, and with the top and bottom of its box of that size."""
     count = len(boxes)
     all_boxes = concatenate([boxes, _bbox_faces(size)])
     first, second = torch.triu_indices(count + 2, count + 2, 1)
     first, second = first[first < count], second[first < count]
     longest = torch.maximum(all_boxes.size[first], all_boxes.size[second]).amax(-1)
-    grow = torch.where(second < count, reach * longest, BBOX_REACH * size[1]) / 2
+    grow = torch.where(second < count, reach * longest, bbox_reach * size[1]) / 2
     near = meet(grown(all_boxes[first], grow), grown(all_boxes[second], grow))
     first, second, grow = first[near], second[near], grow[near]
     if not len(first):
@@ -76,6 +106,27 @@ def find_contacts(boxes: Cuboids, size: Float[Tensor, "3"], reach: float = REACH
     partner = torch.where(second >= count, second - count - 2, second)
     rows = zip(first.tolist(), partner.tolist(), at_a.tolist(), at_b.tolist(), kind.tolist(), point.tolist())
     return [Contact(i, j, tuple(p), tuple(q), k, tuple(w)) for i, j, p, q, k, w in rows]
+
+
+def mark_firm(contacts: list[Contact], leaves: list[Cuboids], reach: float = REACH) -> list[Contact]:
+    """The contacts, those marked that are made by boxes only; `leaves` are the leaf boxes in each cuboid."""
+    inner = [c for c in contacts if c.second >= 0 and len(leaves[c.first]) + len(leaves[c.second]) > 2]
+    if not inner:
+        return contacts
+    start = torch.tensor([0, *(len(own) for own in leaves)]).cumsum(0).tolist()
+    pairs = [
+        (start[c.first] + i, start[c.second] + j, number)
+        for number, c in enumerate(inner)
+        for i in range(len(leaves[c.first]))
+        for j in range(len(leaves[c.second]))
+    ]
+    first, second, number = torch.tensor(pairs).unbind(1)
+    boxes = concatenate(leaves)
+    longest = torch.maximum(boxes.size[first], boxes.size[second]).amax(-1)
+    touching = meet(grown(boxes[first], reach * longest / 2), grown(boxes[second], reach * longest / 2))
+    firm = set(number[touching].tolist())
+    loose = {id(c) for number, c in enumerate(inner) if number not in firm}
+    return [replace(c, firm=False) if id(c) in loose else c for c in contacts]
 
 
 def _bbox_faces(size: Float[Tensor, "3"]) -> Cuboids:
@@ -106,29 +157,30 @@ def meet(a: Cuboids, b: Cuboids) -> Bool[Tensor, " n"]:
 def _touching_points(a: Cuboids, b: Cuboids, grow: Float[Tensor, " n"]) -> tuple[Tensor, Tensor]:
     """For each touching pair the place (n, 3) in the block's frame, and its kind (n)."""
     middle = shared_middle(grown(a, grow), grown(b, grow))
-    point_a, kind_a = _face_centers_in(a, b, 2 * grow, 1)
-    point_b, kind_b = _face_centers_in(b, a, 2 * grow, 2)
-    points = torch.cat([point_a, point_b, middle.unsqueeze(1)], 1)  # (n, 13, 3)
-    kind = torch.cat([kind_a, kind_b, torch.full_like(kind_a[:, :1], MIDDLE)], 1)
-    # Of the best kind the one nearest to the middle; of equals the first, so those of `a` before those of `b`.
-    away = (points - middle.unsqueeze(1)).norm(dim=-1) / (1 + a.size.amax(-1) + b.size.amax(-1)).unsqueeze(-1)
-    best = (kind + 0.5 * away.round(decimals=6)).argmin(-1)
+    points = torch.cat([a.world_many(FACE_CENTERS), b.world_many(FACE_CENTERS), middle.unsqueeze(1)], 1)  # (n, 13, 3)
+    kind = torch.cat([_face_to(a, b, 2 * grow), _face_to(b, a, 2 * grow), torch.full((len(grow), 1), MIDDLE)], 1)
+    # Where boxes miss each other every place moves a little when it is brought into both; none should move more.
+    moves = (_into(a, points) - _into(b, points)).norm(dim=-1)
+    kind = torch.where(moves <= moves[:, -1:] + AS_NEAR * 2 * grow.unsqueeze(-1), kind, 9)
+    away = (points - middle.unsqueeze(1)).norm(dim=-1) / (a.size + b.size).sum(-1, keepdim=True)  # below 1
+    best = (kind + away.round(decimals=6)).argmin(-1)
     rows = torch.arange(len(best))
     return points[rows, best], kind[rows, best]
 
 
-def _face_centers_in(a: Cuboids, b: Cuboids, reach: Float[Tensor, " n"], kind: int) -> tuple[Tensor, Tensor]:
-    """The centers (n, 6, 3) of a's faces, and for each: 0 if it lies on a face of b that looks at it, `kind` if it
-    lies in b, else a number that loses against everything."""
+def _into(boxes: Cuboids, points: Float[Tensor, "n m 3"]) -> Float[Tensor, "n m 3"]:
+    """The nearest points in the boxes."""
+    return boxes.world_many(boxes.local_many(points).clamp(0, 1))
+
+
+def _face_to(a: Cuboids, b: Cuboids, reach: Float[Tensor, " n"]) -> Int[Tensor, "n 6"]:
+    """Whether each of a's faces would lie on a face of b that looks at it (FACE_TO_FACE) or somewhere in b (IN_FACE)."""
     centers, axis = a.world_many(FACE_CENTERS), torch.arange(6) // 2
     normals = a.axes[:, axis] * (2 * (torch.arange(6) % 2) - 1).view(1, 6, 1)
     offset = (centers - b.center.unsqueeze(1)) @ b.axes.mT  # (n, 6, 3), along b's axes
-    half, reach = b.size.unsqueeze(1) / 2, reach.view(-1, 1, 1)
-    inside = (offset.abs() <= half + reach).all(-1)
     facing = normals @ b.axes.mT  # cosines between a's face and b's axes
-    on_face = ((offset + facing.sign() * half).abs() <= reach) & (facing.abs() >= UPRIGHT)
-    found = torch.where(inside, torch.where(on_face.any(-1), 0, kind), MIDDLE + 1)
-    return centers, found
+    on_face = (offset + facing.sign() * b.size.unsqueeze(1) / 2).abs() <= reach.view(-1, 1, 1)
+    return torch.where((on_face & (facing.abs() >= UPRIGHT)).any(-1), FACE_TO_FACE, IN_FACE)
 
 
 def shared_middle(a: Cuboids, b: Cuboids) -> Float[Tensor, "n 3"]:

@@ -11,7 +11,7 @@ import torch
 from ..interpreters.shapeassembly import Program, ProgramError, execute_many
 from .arranging import collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers, LEVELS
 from .bounding import refit, seen_from
-from .contacts import BOTTOM, TOP, find_contacts
+from .contacts import BOTTOM, TOP, connecting_contacts, mark_firm
 from .errors import RejectedError
 from .labels import RANKED
 from .ordering import AS_GOOD, grounded_order
@@ -127,14 +127,15 @@ def look(parts: list[Part], size, category: str, options: Options) -> BlockFacts
     aligned = is_upright(boxes)
     if not options.aligned_flag:
         aligned = torch.zeros_like(aligned)
-    return BlockFacts(tuple(parts), boxes, aligned, size, tuple(find_contacts(boxes, size)))
+    contacts = mark_firm(connecting_contacts(boxes, size), [stack(part.leaves()) for part in parts])
+    return BlockFacts(tuple(parts), boxes, aligned, size, tuple(contacts))
 
 
 def place(facts: BlockFacts, options: Options):
     """How each written part is held, in grounded order. Raises RejectedError ("disconnected")."""
     written, standing = facts.written, {BOTTOM, TOP, *facts.written}
     contacts = [c for c in facts.contacts if c.first in standing and c.second in standing]
-    ways = [way for i in written for way in ways_to_place(i, contacts, options.macros)]
+    ways = [way for i in written for way in ways_to_place(i, contacts, facts.boxes, facts.size, not facts.aligned[i], options.macros)]
     misfits = judge(ways, facts.boxes, facts.aligned, facts.size).tolist()
     own = {i: [] for i in written}
     for way, misfit in zip(ways, misfits):

@@ -14,12 +14,12 @@ MOST_SHOWN = 40  # characters of a value in a message
 
 
 class Node:
-    """A part as the file has it. `children` are filled in as parts when they are built."""
+    """A part as the file has it: the value, and where in the tree it stands."""
 
     def __init__(self, value: object, parent: "Node | None" = None, place: int = 0):
         self.value, self.parent, self.place = value, parent, place
         self.level = parent.level + 1 if parent else 1
-        self.built: list[Part] = []  # its children, the last one first
+        self.built: list[Part] = []  # its children once they are parts, the last one first
 
     def get(self, key: str) -> object:
         return self.value.get(key)
@@ -39,13 +39,13 @@ class Node:
     @property
     def _step(self) -> str:
         label = self.value.get("label") if isinstance(self.value, dict) else None
-        step = (
-            repr(label[:MOST_SHOWN])[1:-1] if isinstance(label, str) else "?"
-        )  # repr: on one line, printable
+        unnamed = "?" if self.parent else "root"
+        step = repr(label[:MOST_SHOWN])[1:-1] if isinstance(label, str) else unnamed  # repr: no line breaks
         return f"{step}[{self.place}]" if self.parent else step
 
     def error(self, found: str, expected: str) -> PartGraphError:
-        return PartGraphError(found, expected, self.path if self.parent or self._step != "?" else "")
+        """An error about this part, by its path."""
+        return PartGraphError(found, expected, self.path)
 
 
 def walk(root: object) -> list[Node]:
@@ -83,13 +83,14 @@ def _checked(node: Node) -> list:
 
 
 def list_of(node: Node, key: str) -> list | tuple:
+    """The list under `key`, empty where there is none."""
     value = node.get(key)
     if value is not None and not isinstance(value, list | tuple):
         raise node.error(f"{key} is {shown(value)}", "a list")
     return value or []
 
 
-def ids(nodes: list[Node]) -> list[int]:
+def ids_of(nodes: list[Node]) -> list[int]:
     """The parts' ids; those without one get the numbers from 0 on that nobody has."""
     owner: dict[int, Node] = {}
     for node in nodes:
@@ -113,6 +114,8 @@ def shown(value: object) -> str:
         return f"a list of {len(value)}"
     if isinstance(value, int) and abs(value) >= 2**63:
         return "a huge whole number"
+    if isinstance(value, str):
+        value = value[: MOST_SHOWN + 1]
     if value is None or isinstance(value, str | int | float):
         text = json.dumps(value)
         return text if len(text) <= MOST_SHOWN else text[: MOST_SHOWN - 1] + "…"

@@ -19,8 +19,8 @@ from ..interpreters.cuboids import Cuboids
 from .boxes import oriented_boxes
 from .errors import PartGraphError, PartGraphWarning
 from .labels import RANKED
-from .nodes import MOST_SHOWN, TOO_DEEP, Node, ids, list_of, shown, walk
-from .partgraph import CATEGORIES, UNLABELLED, Part, PartGraph
+from .nodes import MOST_SHOWN, TOO_DEEP, Node, ids_of, list_of, shown, walk
+from .partgraph import CATEGORIES, UNLABELLED, Part, PartGraph, unstack
 
 ALIASES = {"storagefurniture": "storage"}  # PartNet's own name
 _MOST_LISTED = 40  # words in a message
@@ -36,14 +36,13 @@ def parse(source: str | bytes | dict, category: str = "", file: str = "") -> Par
     try:
         nodes = walk(_read_json(source) if isinstance(source, str | bytes) else source)
         boxes, repaired = oriented_boxes(nodes)
-        root = _build(nodes, boxes, ids(nodes))
+        root = _build(nodes, unstack(boxes), ids_of(nodes))
     except PartGraphError as error:
         raise error.in_file(file) from None
     unknown = _unknown_labels(nodes, category)
     if repaired:
-        _warn(
-            f"axes set at right angles and to length 1 in {_listed([node.path for node in repaired])}", file
-        )
+        paths = _listed([node.path for node in repaired])
+        _warn(f"axes set at right angles and to length 1 in {paths}", file)
     if unknown:
         _warn(f"labels that no {category} of the authors' data has: {_listed(unknown)}", file)
     return PartGraph(root, category, Path(file).stem if file else "")
@@ -53,9 +52,8 @@ def known_category(category: str) -> str:
     """The category by our name for it. Raises PartGraphError naming the choices."""
     name = ALIASES.get(category, category)
     if name not in (*CATEGORIES, ""):
-        raise PartGraphError(
-            f"unknown category {shown(category)}", f'{", ".join(CATEGORIES)}, or "" for none'
-        )
+        choices = ", ".join(CATEGORIES)
+        raise PartGraphError(f"unknown category {shown(category)}", f'one of {choices}, or "" for none')
     return name
 
 
@@ -64,9 +62,8 @@ def to_json(graph: PartGraph) -> str:
 
     Ids that repeat are replaced by 0, 1, 2, …. Raises PartGraphError for a graph that could not be read again.
     """
-    parts = graph.root.walk()
     try:
-        parts = list(parts)
+        parts = list(graph.root.walk())
         repeated = len({part.id for part in parts}) < len(parts)
         numbers = count() if repeated else (part.id for part in parts)
         value = _to_value(graph.root, numbers)
@@ -124,7 +121,7 @@ def _loads(text: str) -> object:
         raise PartGraphError("not JSON: a number with thousands of digits", "one JSON object") from None
 
 
-def _build(nodes: list[Node], boxes: Cuboids, ids: list[int]) -> Part:
+def _build(nodes: list[Node], boxes: list[Cuboids], ids: list[int]) -> Part:
     """The tree, from the leaves up; the root is built last."""
     for at in reversed(range(len(nodes))):
         node = nodes[at]

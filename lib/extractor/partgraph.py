@@ -67,8 +67,8 @@ class PartGraph:
         """
         if not len(shape.cuboids):
             raise PartGraphError("the shape has no cuboids", "at least one leaf", file=name)
-        boxes, parents = shape.boxes.detach().to("cpu", torch.float64), shape.parents
-        drawn = shape.is_leaf
+        boxes = unstack(shape.boxes.detach().to("cpu", torch.float64))
+        parents, drawn = shape.parents, shape.is_leaf
         below: dict[int, list[int]] = {}
         for number, parent in enumerate(parents):
             below.setdefault(parent, []).append(number)
@@ -133,6 +133,12 @@ class PartGraph:
 def stack(parts: list[Part] | tuple[Part, ...]) -> Cuboids:
     """The boxes of several parts as one batch, (n,)."""
     return stack_boxes([part.box for part in parts])
+
+
+def unstack(boxes: Cuboids) -> list[Cuboids]:
+    """A batch of boxes, (n,), one by one, each with memory of its own: pickled, a view takes the whole batch along."""
+    rows = zip(*(tensor.unbind() for tensor in (boxes.size, boxes.center, boxes.axes)))
+    return [Cuboids(*(tensor.clone() for tensor in row)) for row in rows]
 
 
 def stack_boxes(boxes: list[Cuboids]) -> Cuboids:

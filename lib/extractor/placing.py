@@ -19,7 +19,7 @@ from ..interpreters.cuboids import Cuboids, concatenate
 from ..interpreters.shapeassembly.attaching import choose, move, stretch_and_turn
 from ..interpreters.shapeassembly.growing import grow
 from ..interpreters.shapeassembly.program import FACES
-from .contacts import BOTTOM, TOP, Contact
+from .contacts import BOTTOM, MIDDLE, TOP, Contact
 
 DIGITS = 3  # decimals of local coordinates in the text, as in the authors' data set
 AT_CENTER = 0.05  # how far (L1, local) a contact may be from a face's center for a squeeze (the authors' program)
@@ -47,18 +47,52 @@ class Way:
         return 1 if self.face else len(self.partners)
 
 
-def ways_to_place(cuboid: int, contacts: list[Contact], squeezes: bool = True) -> list[Way]:
-    """Every way to hold `cuboid` by its contacts, not yet judged."""
-    own = [contact for contact in contacts if cuboid in (contact.first, contact.second)]
-    ends = [(c.partner(cuboid), _rounded(c.at(cuboid)), _rounded(c.at(c.partner(cuboid))), c.kind) for c in own]
+def ways_to_place(
+    cuboid: int, contacts: list[Contact], boxes: Cuboids, size: Float[Tensor, "3"], tilted: bool, squeezes: bool = True
+) -> list[Way]:
+    """Every way to hold `cuboid` by its contacts, not yet judged.
+
+    A tilted cuboid is turned by its second attach, by as little as possible; only a line of contacts that is normal
+    to the axis of its turn turns it right. So for such a cuboid the second place is also moved onto that normal.
+    """
+    ends = [
+        (c.partner(cuboid), _rounded(c.at(cuboid)), _rounded(c.at(c.partner(cuboid))), c.kind)
+        for c in contacts
+        if cuboid in (c.first, c.second)
+    ]
     ways = [Way(cuboid, (p,), ((q, r),), (kind,)) for p, q, r, kind in ends]
+    turn = turning_axis(boxes.axes[cuboid]) if tilted else None
     for (p1, q1, r1, kind1), (p2, q2, r2, kind2) in permutations(ends, 2):
         if _distance(q1, q2) < APART:
             continue
         ways.append(Way(cuboid, (p1, p2), ((q1, r1), (q2, r2)), (kind1, kind2)))
         if squeezes and (face := _squeezed_face((p1, q1, r1), (p2, q2, r2))):
             ways.append(Way(cuboid, (p1, p2), squeeze_points(face, p1, p2, r1), (kind1, kind2), face))
+        if turn is not None:
+            partner = boxes[p2] if p2 >= 0 else bounding_box(size)
+            aimed = _aimed(boxes[cuboid], partner, q1, q2, turn)
+            ways.append(Way(cuboid, (p1, p2), ((q1, r1), aimed), (kind1, MIDDLE)))
     return ways
+
+
+def turning_axis(axes: Float[Tensor, "3 3"]) -> Float[Tensor, "3"]:
+    """The unit axis about which a box turns from upright to `axes` (rows right, top, front)."""
+    skewed = torch.stack([axes[1, 2] - axes[2, 1], axes[2, 0] - axes[0, 2], axes[0, 1] - axes[1, 0]])
+    return skewed / skewed.norm().clamp(min=1e-12)
+
+
+def _aimed(box: Cuboids, partner: Cuboids, first: Point, second: Point, turn: Tensor) -> tuple[Point, Point]:
+    """The second place of contact moved along the axis of the turn, until the line from the first is normal to it."""
+    points = torch.tensor([first, second], dtype=torch.float64)
+    start, end = box.world_many(points)
+    place = end - turn * ((end - start) @ turn)
+    inside = box.world(box.local(place).clamp(0, 1))
+    return tuple(_rounded(b.local(inside).clamp(0, 1).tolist()) for b in (box, partner))
+
+
+def bounding_box(size: Float[Tensor, "3"]) -> Cuboids:
+    """The block's own box (single), in its own frame."""
+    return Cuboids(size, torch.zeros(3, dtype=torch.float64), torch.eye(3, dtype=torch.float64))
 
 
 def _rounded(point: Point) -> Point:
@@ -111,8 +145,7 @@ def judge(ways: list[Way], boxes: Cuboids, aligned: Bool[Tensor, " n"], size: Fl
     """How far each way leaves the farthest corner of its cuboid from where it should be, in block units."""
     if not ways:
         return torch.zeros(0, dtype=torch.float64)
-    bbox = Cuboids(size.unsqueeze(0), torch.zeros(1, 3).double(), torch.eye(3).double().unsqueeze(0))
-    partners = concatenate([boxes, bbox])
+    partners = concatenate([boxes, bounding_box(size)[None]])
     cuboid = torch.tensor([way.cuboid for way in ways])
     first = torch.tensor([way.partners[0] for way in ways])
     second = torch.tensor([way.partners[-1] for way in ways])

@@ -43,7 +43,7 @@ def _components(cuboids: list[int], contacts: list[Contact]) -> list[list[int]]:
     index = {cuboid: k for k, cuboid in enumerate(cuboids)}
     links = torch.zeros(len(cuboids), len(cuboids))
     for contact in contacts:
-        if contact.first in index and contact.second in index:
+        if contact.firm and contact.first in index and contact.second in index:
             links[index[contact.first], index[contact.second]] = 1
     _, number = connected_components(links.numpy(), directed=False)
     groups: dict[int, list[int]] = {}
@@ -58,7 +58,7 @@ def _same_partners(component: list[int], pairs: dict[int, int], contacts: list[C
     if len(other) < len(half):
         return False
     touched = [
-        {contact.partner(i) for contact in contacts for i in (contact.first, contact.second) if i in side}
+        {c.partner(i) for c in contacts if c.firm for i in (c.first, c.second) if i in side}
         - half
         - other
         for side in (half, other)

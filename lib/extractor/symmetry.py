@@ -4,9 +4,10 @@ Parts form a group if (i) they touch the same parts, (ii) one is the mirror imag
 spaced, along the x, y or z axis of the block's box, and (iii) so are the places where they touch. Only the first
 member of a group is written down; `reflect` or `translate` makes the others.
 
-The longest rows (three and more members) are taken first, then mirrored pairs about X, Y, Z, then rows of two. For
-(i), members of the group that touch each other do not count: a copy is attached to what its source is attached to.
-Inner parts are compared with all that is in them, as the language would copy it.
+The longest rows (three and more members) are taken first, then mirrored pairs about X, Y, Z, then rows of two. Inner
+parts are compared with all that is in them, as the language would copy it. For (i) we look away from more than the
+paper does: members may touch each other, and the first and last slat of a row what comes before and after the row.
+A copy is attached to what its source is attached to; all that matters is that nothing loses its only hold.
 """
 
 from dataclasses import dataclass
@@ -62,24 +63,30 @@ class Surroundings:
         for contact in contacts:
             place = torch.tensor(contact.point, dtype=torch.float64)
             for cuboid in (contact.first, contact.second):
-                if cuboid not in (BOTTOM, TOP):
+                if contact.firm and cuboid not in (BOTTOM, TOP):
                     self.touched[cuboid][contact.partner(cuboid)] = place
 
     def agree(self, group: Group, boxes: Cuboids) -> bool:
         """Conditions (i) and (iii): all members touch the same parts outside the group, at corresponding places."""
-        members = set(group.members)
-        outside = [{p: w for p, w in self.touched[m].items() if p not in members} for m in group.members]
-        first = outside[0]
-        if not first or any(other.keys() != first.keys() for other in outside[1:]):
+        outside = [self.touched[member].keys() - set(group.members) for member in group.members]
+        shared = set.intersection(*outside)
+        ends = (0, len(outside) - 1) if len(outside) > 2 else ()
+        extra = {partner for k, touched in enumerate(outside) for partner in touched - shared if k in ends}
+        if not shared or any(touched - shared and k not in ends for k, touched in enumerate(outside)):
             return False
-        axis = AXES.index(group.axis)
-        for member, other in zip(group.members[1:], outside[1:]):
-            shift = boxes.center[member, axis] - boxes.center[group.members[0], axis]
-            for partner, place in first.items():
-                wanted = place.clone()
-                wanted[axis] = -place[axis] if group.kind == "reflect" else place[axis] + shift
-                if float((wanted - other[partner]).norm()) > self.tolerance:
-                    return False
+        if any(self.touched[partner].keys() <= set(group.members) for partner in extra if partner >= 0):
+            return False
+        return all(self._same_places(group, member, shared, boxes) for member in group.members[1:])
+
+    def _same_places(self, group: Group, member: int, partners: set[int], boxes: Cuboids) -> bool:
+        """Does a copy touch its partners where the image of the source would?"""
+        source, axis = group.members[0], AXES.index(group.axis)
+        shift = boxes.center[member, axis] - boxes.center[source, axis]
+        for partner in partners:
+            wanted = self.touched[source][partner].clone()
+            wanted[axis] = -wanted[axis] if group.kind == "reflect" else wanted[axis] + shift
+            if float((wanted - self.touched[member][partner]).norm()) > self.tolerance:
+                return False
         return True
 
 

@@ -58,12 +58,15 @@ def judge_shape(shape: Shape, graph: PartGraph) -> tuple[str, str, float]:
 
 
 def sticking_out(shape: Shape) -> list[str]:
-    """Names of the boxes that reach beyond the box of their block."""
-    parents = torch.tensor(shape.parents)
-    inner = (parents >= 0).nonzero().squeeze(-1)
-    boxes, around = shape.boxes[inner], shape.boxes[parents[inner]]
-    offset = torch.einsum("nck,nik->nci", boxes.corners() - around.center.unsqueeze(1), around.axes).abs()
-    diagonal = shape.boxes.size[0].norm()
-    allowed = torch.maximum(STICKS_OUT * around.size, ALWAYS_ALLOWED * diagonal)
-    beyond = (offset - around.size.unsqueeze(1) / 2 > allowed.unsqueeze(1)).any(-1).any(-1)
-    return [shape.box_names[i] for i in inner[beyond].tolist()]
+    """Names of the leaves that reach beyond the box of their block, or of one around it."""
+    parents, diagonal = torch.tensor(shape.parents), shape.boxes.size[0].norm()
+    leaf = torch.tensor(shape.is_leaf).nonzero().squeeze(-1)
+    beyond, around = torch.zeros(len(leaf), dtype=torch.bool), parents[leaf]
+    while (around >= 0).any():
+        within = shape.boxes[around.clamp(min=0)]
+        offset = torch.einsum("nck,nik->nci", shape.cuboids.corners() - within.center.unsqueeze(1), within.axes)
+        allowed = torch.maximum(STICKS_OUT * within.size, ALWAYS_ALLOWED * diagonal)
+        out = (offset.abs() - within.size.unsqueeze(1) / 2 > allowed.unsqueeze(1)).any(-1).any(-1)
+        beyond |= out & (around >= 0)
+        around = torch.where(around >= 0, parents[around.clamp(min=0)], -1)
+    return [shape.box_names[i] for i in leaf[beyond].tolist()]

@@ -12,7 +12,10 @@ def leaning(shop: Workshop, frame, piece: Piece) -> Piece:
 
 def slab(shop: Workshop, frame) -> list[Piece]:
     """One upholstered board that stands on the seat or behind it."""
-    thick, half = shop.between(0.03, 0.06) + 0.25 * max(0, frame.thick - 0.1), frame.width / 2 * shop.between(0.88, 1.0)
+    thick, half = (
+        shop.between(0.03, 0.06) + 0.25 * max(0, frame.thick - 0.1),
+        frame.width / 2 * shop.between(0.88, 1.0),
+    )
     behind = shop.chance(0.5)
     bottom = frame.height - frame.thick * shop.between(0.3, 1.0) if behind else frame.height
     z = (frame.rear - thick, frame.rear) if behind else (frame.rear, frame.rear + thick)
@@ -24,9 +27,13 @@ def winged(shop: Workshop, frame) -> list[Piece]:
     """A middle board between two wings that stand forward."""
     thick, half, deep = shop.between(0.04, 0.08), frame.width / 2, shop.between(0.1, 0.2)
     y, wing = (frame.height, frame.height + frame.back), shop.between(0.04, 0.07)
-    middle = shop.block("back_single_surface", (wing - half, half - wing), y, (frame.rear, frame.rear + thick))
+    middle = shop.block(
+        "back_single_surface", (wing - half, half - wing), y, (frame.rear, frame.rear + thick)
+    )
     low = frame.height + frame.back * shop.pick(0.0, shop.between(0.3, 0.5))
-    side = shop.block("back_single_surface", (half - wing, half), (low, y[1] * 0.99), (frame.rear, frame.rear + deep))
+    side = shop.block(
+        "back_single_surface", (half - wing, half), (low, y[1] * 0.99), (frame.rear, frame.rear + deep)
+    )
     return [group("back_surface", middle, *shop.both(side))]
 
 
@@ -91,7 +98,10 @@ def spindles(shop: Workshop, frame) -> list[Piece]:
     step = gap / (count + 1) if sides else (gap - thick) / (count - 1)
     x = -step * (count - 1) / 2
     bar = shop.block(
-        "back_surface_vertical_bar", (x - thick / 2, x + thick / 2), (bottom, top - high), (z - thick / 2, z + thick / 2)
+        "back_surface_vertical_bar",
+        (x - thick / 2, x + thick / 2),
+        (bottom, top - high),
+        (z - thick / 2, z + thick / 2),
     )
     return [group("back_surface", *shop.row(bar, (step, 0, 0), count)), group("back_frame", *sides, *rails)]
 
@@ -101,7 +111,9 @@ def splat(shop: Workshop, frame) -> list[Piece]:
     sides, z, gap = posts(shop, frame)
     high, top, half = shop.between(0.04, 0.08), frame.height + frame.back, gap * shop.between(0.12, 0.25)
     rail = _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.025)
-    board = shop.block("back_surface_vertical_bar", (-half, half), (frame.height, top - high), (z - 0.008, z + 0.008))
+    board = shop.block(
+        "back_surface_vertical_bar", (-half, half), (frame.height, top - high), (z - 0.008, z + 0.008)
+    )
     return [group("back_surface", board), group("back_frame", *sides, rail)]
 
 
@@ -124,14 +136,23 @@ def panel_on_posts(shop: Workshop, frame) -> list[Piece]:
     sides, z, gap = posts(shop, frame)
     top, low = frame.height + frame.back, frame.height + frame.back * shop.between(0.15, 0.5)
     thick = shop.between(0.018, 0.035)
-    board = shop.block("back_single_surface", (-gap / 2, gap / 2), (low, top - shop.between(0, 0.03)), (z - thick / 2, z + thick / 2))
+    board = shop.block(
+        "back_single_surface",
+        (-gap / 2, gap / 2),
+        (low, top - shop.between(0, 0.03)),
+        (z - thick / 2, z + thick / 2),
+    )
     return [group("back_surface", board), group("back_frame", *sides)]
 
 
 def framed(shop: Workshop, frame) -> list[Piece]:
     """A board in a full frame: two posts and two rails."""
     sides, z, gap = posts(shop, frame)
-    top, high, low = frame.height + frame.back, shop.between(0.03, 0.05), frame.height + frame.back * shop.pick(0.0, 0.2)
+    top, high, low = (
+        frame.height + frame.back,
+        shop.between(0.03, 0.05),
+        frame.height + frame.back * shop.pick(0.0, 0.2),
+    )
     rails = [
         _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.028),
         _rail(shop, "back_frame_horizontal_bar", gap, z, (low, low + high), 0.028),
@@ -150,15 +171,25 @@ def rail(shop: Workshop, frame) -> list[Piece]:
 
 def panel_on_stem(shop: Workshop, frame) -> list[Piece]:
     """A board on one or two narrow stems that come from behind the seat."""
-    thick, half, low = shop.between(0.04, 0.07), frame.width / 2 * shop.between(0.75, 1.0), shop.between(0.08, 0.16)
+    thick, half, low = (
+        shop.between(0.04, 0.07),
+        frame.width / 2 * shop.between(0.75, 1.0),
+        shop.between(0.08, 0.16),
+    )
     top = frame.height + frame.back
-    board = shop.block("back_single_surface", (-half, half), (frame.height + low, top), (frame.rear, frame.rear + thick))
+    board = shop.block(
+        "back_single_surface", (-half, half), (frame.height + low, top), (frame.rear, frame.rear + thick)
+    )
     y = (frame.under, frame.height + low + shop.between(0.1, 0.5) * (frame.back - low))
     if shop.chance(0.6):
         wide = shop.between(0.025, 0.05)
         stems = [shop.block("back_connector", (-wide, wide), y, (frame.rear - 0.022, frame.rear))]
     else:
-        stems = shop.both(shop.block("back_connector", (half * 0.45, half * 0.45 + 0.03), y, (frame.rear - 0.022, frame.rear)))
+        stems = shop.both(
+            shop.block(
+                "back_connector", (half * 0.45, half * 0.45 + 0.03), y, (frame.rear - 0.022, frame.rear)
+            )
+        )
     return [group("back_surface", board), *stems]
 
 
@@ -167,19 +198,27 @@ WOODEN = (ladder, spindles, spindles, splat, cross, framed, rail)
 
 def head(shop: Workshop, frame) -> list[Piece]:
     """A pad above the back, on it or on two short bars."""
-    gap, half, high = shop.pick(0.0, shop.between(0.03, 0.06)), frame.width * shop.between(0.24, 0.34), shop.between(0.09, 0.15)
+    gap, half, high = (
+        shop.pick(0.0, shop.between(0.03, 0.06)),
+        frame.width * shop.between(0.24, 0.34),
+        shop.between(0.09, 0.15),
+    )
     bottom = frame.height + frame.back + gap
     z = frame.rear + 0.01
     pad = shop.block("headrest", (-half, half), (bottom, bottom + high), (z - 0.025, z + 0.035))
     if not gap:
         return [pad]
-    bar = shop.block("head_connector", (half * 0.5, half * 0.5 + 0.018), (bottom - gap, bottom), (z - 0.009, z + 0.009))
+    bar = shop.block(
+        "head_connector", (half * 0.5, half * 0.5 + 0.018), (bottom - gap, bottom), (z - 0.009, z + 0.009)
+    )
     return [pad, *shop.both(bar)]
 
 
 def arms(shop: Workshop, frame) -> list[Piece]:
     """A pair of arms beside the seat, of bars or as a frame; or one writing tablet."""
-    style = shop.pick(post_arm, two_post_arm, tee_arm, slanted_arm, loop_arm, panel_arm, weights=(4, 2, 2, 2, 1, 1))
+    style = shop.pick(
+        post_arm, two_post_arm, tee_arm, slanted_arm, loop_arm, panel_arm, weights=(4, 2, 2, 2, 1, 1)
+    )
     side = group("chair_arm", *style(shop, frame, shop.between(0.16, 0.24)))
     if shop.chance(0.06):
         return [group("chair_arm", *writing_tablet(shop, frame))]
@@ -202,7 +241,10 @@ def _arm_post(shop: Workshop, frame, rise: float, z: float, wide: float, thick: 
     """An upright beside the seat, from its underside to the arm's bar."""
     x = frame.width / 2 - 0.002
     return shop.block(
-        "arm_near_vertical_bar", (x, x + wide), (frame.under, frame.height + rise - 0.025), (z - thick / 2, z + thick / 2)
+        "arm_near_vertical_bar",
+        (x, x + wide),
+        (frame.under, frame.height + rise - 0.025),
+        (z - thick / 2, z + thick / 2),
     )
 
 
@@ -226,7 +268,10 @@ def tee_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
     wide, half = shop.between(0.05, 0.08), frame.depth * shop.between(0.25, 0.35)
     x, y = frame.width / 2 - 0.002, frame.height + rise
     pad = shop.block("arm_horizontal_bar", (x - 0.01, x - 0.01 + wide), (y - 0.03, y), (-half, half))
-    return [pad, _arm_post(shop, frame, rise - 0.005, shop.between(-0.04, 0.03), 0.028, shop.between(0.03, 0.07))]
+    return [
+        pad,
+        _arm_post(shop, frame, rise - 0.005, shop.between(-0.04, 0.03), 0.028, shop.between(0.03, 0.07)),
+    ]
 
 
 def slanted_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
@@ -250,7 +295,10 @@ def panel_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
     """A bar on a closed panel."""
     x, wide, forward = frame.width / 2 - 0.002, shop.between(0.03, 0.05), shop.between(0.7, 1.0)
     y, z = (frame.under, frame.height + rise - 0.025), (frame.rear, -frame.rear * forward)
-    return [_arm_bar(shop, frame, rise, wide, forward), shop.block("arm_near_vertical_bar", (x, x + 0.022), y, z)]
+    return [
+        _arm_bar(shop, frame, rise, wide, forward),
+        shop.block("arm_near_vertical_bar", (x, x + 0.022), y, z),
+    ]
 
 
 def writing_tablet(shop: Workshop, frame) -> list[Piece]:

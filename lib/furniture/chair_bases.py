@@ -38,7 +38,9 @@ def legs(shop: Workshop, frame) -> list[Piece]:
     return pieces + stretchers(shop, style, front, back)
 
 
-def stretchers(shop: Workshop, style: str, front: Leg, back: Leg, label: str = "bar_stretcher") -> list[Piece]:
+def stretchers(
+    shop: Workshop, style: str, front: Leg, back: Leg, label: str = "bar_stretcher"
+) -> list[Piece]:
     """Bars between four legs; `style` is "none", "sides", "H", "box", "front and back" or "X"."""
     low, high, thin = shop.between(0.2, 0.4), shop.between(0.45, 0.65), min(front.thick, back.thick) * 0.6
     share = low if style in ("X", "H") else high
@@ -51,7 +53,9 @@ def stretchers(shop: Workshop, style: str, front: Leg, back: Leg, label: str = "
     if style in ("box", "front and back"):
         for leg in (front, back):
             x, y, z = leg.at(low)
-            pieces.append(shop.block(label, (-x, x), (y - thin / 2, y + thin / 2), (z - thin / 2, z + thin / 2)))
+            pieces.append(
+                shop.block(label, (-x, x), (y - thin / 2, y + thin / 2), (z - thin / 2, z + thin / 2))
+            )
     if style == "X":
         end, start = front.at(share), back.at(share) * (-1, 1, 1)
         along = 0 if end[0] - start[0] > end[2] - start[2] else 2
@@ -80,9 +84,13 @@ def cantilever(shop: Workshop, frame) -> list[Piece]:
     x, z = frame.width / 2 - thick / 2, frame.depth / 2 - thick
     lean = shop.pick(0.0, shop.between(0.02, 0.08))
     leg = Leg((x, thick / 2, z + lean), (x, frame.under, z), thick)
-    runner = shop.block("runner", (x - thick / 2, x + thick / 2), (0, thick), (-z - thick, z + lean + thick / 2))
+    runner = shop.block(
+        "runner", (x - thick / 2, x + thick / 2), (0, thick), (-z - thick, z + lean + thick / 2)
+    )
     bar = shop.block("bar_stretcher", (thick / 2 - x, x - thick / 2), (0, thick), (-z - thick, -z))
-    rail = shop.block("seat_support", (x - thick / 2, x + thick / 2), (frame.under - thick, frame.under), (-z, z))
+    rail = shop.block(
+        "seat_support", (x - thick / 2, x + thick / 2), (frame.under - thick, frame.under), (-z, z)
+    )
     rails = shop.both(rail) if shop.chance(0.5) else []
     return shop.both(leg.build(shop), runner) + [bar] + rails
 
@@ -94,7 +102,9 @@ def crossed(shop: Workshop, frame) -> list[Piece]:
     outer = shop.beam("leg", (x, 0, -reach), (x, top, reach), (thick, thick))
     inner = shop.beam("leg", (x - thick, 0, reach), (x - thick, top, -reach), (thick, thick))
     y, z, half = top * 0.15, reach * 0.7, x - thick / 2
-    bar = shop.block("bar_stretcher", (-half, half), (y - thick / 2, y + thick / 2), (z - thick / 2, z + thick / 2))
+    bar = shop.block(
+        "bar_stretcher", (-half, half), (y - thick / 2, y + thick / 2), (z - thick / 2, z + thick / 2)
+    )
     return shop.both(outer, inner) + ([bar] if shop.chance(0.7) else [])
 
 
@@ -104,7 +114,9 @@ def panels(shop: Workshop, frame) -> list[Piece]:
     pieces = shop.both(shop.block("leg", (half - thick, half), (0, frame.under), (frame.rear, -frame.rear)))
     if shop.chance(0.5):
         high = (frame.under * shop.between(0.3, 0.7), frame.under)
-        pieces.append(shop.block("bar_stretcher", (thick - half, half - thick), high, (frame.rear, frame.rear + 0.025)))
+        pieces.append(
+            shop.block("bar_stretcher", (thick - half, half - thick), high, (frame.rear, frame.rear + 0.025))
+        )
     return pieces
 
 
@@ -120,7 +132,9 @@ def h_legs(shop: Workshop, frame) -> list[Piece]:
         side.append(shop.beam("bar_stretcher", back.at(0.95), front.at(0.95), (thin, thin), along=2))
     sides = shop.both(group("leg", *side))
     x, height, z = (front.at(y) + back.at(y)) / 2
-    middle = shop.block("bar_stretcher", (-x, x), (height - thin / 2, height + thin / 2), (z - thin / 2, z + thin / 2))
+    middle = shop.block(
+        "bar_stretcher", (-x, x), (height - thin / 2, height + thin / 2), (z - thin / 2, z + thin / 2)
+    )
     return sides + ([middle] if shop.chance(0.6) else [])
 
 
@@ -168,7 +182,9 @@ def star(shop: Workshop, frame) -> list[Piece]:
     return pieces + _footrest(shop, frame, column)
 
 
-def _spoke(shop: Workshop, direction: np.ndarray, reach: tuple, height: float, rise: float, thick: float) -> list[Piece]:
+def _spoke(
+    shop: Workshop, direction: np.ndarray, reach: tuple, height: float, rise: float, thick: float
+) -> list[Piece]:
     """A leg of a star, between two distances from the middle; it is `rise` higher at the inner one."""
     hub, tip = direction * reach[0] + (0, height + rise, 0), direction * reach[1] + (0, height, 0)
     along = 0 if abs(direction[0]) > abs(direction[2]) + 1e-9 else 2
@@ -179,7 +195,9 @@ def _spoke(shop: Workshop, direction: np.ndarray, reach: tuple, height: float, r
 def _caster(shop: Workshop, place: np.ndarray) -> Piece:
     x, _, z = place
     stem = shop.block("caster_stem", (x - 0.008, x + 0.008), (0.04, 0.065), (z - 0.008, z + 0.008))
-    return group("caster", stem, shop.block("wheel", (x - 0.016, x + 0.016), (0, 0.042), (z - 0.022, z + 0.022)))
+    return group(
+        "caster", stem, shop.block("wheel", (x - 0.016, x + 0.016), (0, 0.042), (z - 0.022, z + 0.022))
+    )
 
 
 def tripod(shop: Workshop, frame) -> list[Piece]:
@@ -191,7 +209,9 @@ def tripod(shop: Workshop, frame) -> list[Piece]:
     pieces = [back.build(shop), *shop.both(front.build(shop))]
     if shop.chance(0.5):
         (x, y, z), thin = front.at(shop.between(0.3, 0.5)), thick * 0.6
-        pieces.append(shop.block("bar_stretcher", (-x, x), (y - thin / 2, y + thin / 2), (z - thin / 2, z + thin / 2)))
+        pieces.append(
+            shop.block("bar_stretcher", (-x, x), (y - thin / 2, y + thin / 2), (z - thin / 2, z + thin / 2))
+        )
     return pieces
 
 
@@ -208,14 +228,22 @@ def rockers(shop: Workshop, frame) -> list[Piece]:
 
 def feet(shop: Workshop, frame) -> list[Piece]:
     """Short feet, straight or splayed, with or without a rail between them."""
-    thick, inset, splay = shop.between(0.03, 0.07), shop.between(0.0, 0.05), shop.pick(0.0, shop.between(0.01, 0.04))
+    thick, inset, splay = (
+        shop.between(0.03, 0.07),
+        shop.between(0.0, 0.05),
+        shop.pick(0.0, shop.between(0.01, 0.04)),
+    )
     x, z = frame.width / 2 - inset - thick / 2, frame.depth / 2 - inset - thick / 2
     label = shop.pick("foot", "leg")
     front = Leg((x + splay, 0, z + splay), (x, frame.under, z), thick)
     back = Leg((x + splay, 0, -z - splay), (x, frame.under, -z), thick)
     pieces = shop.both(front.build(shop, label), back.build(shop, label))
     if frame.width > 1.6:  # a long sofa stands on its middle, too
-        pieces += shop.row(shop.beam(label, (0, 0, z + splay), (0, frame.under, z), (thick, thick)), (0, 0, -2 * z - splay), 2)
+        pieces += shop.row(
+            shop.beam(label, (0, 0, z + splay), (0, frame.under, z), (thick, thick)),
+            (0, 0, -2 * z - splay),
+            2,
+        )
     return pieces
 
 

@@ -18,7 +18,9 @@ def cushion_on_board(shop: Workshop, frame) -> list[Piece]:
     middle = frame.under + frame.thick * shop.between(0.25, 0.5)
     board_z = (frame.rear - border, -frame.rear + border)
     board = shop.block("seat_support", (-half - border, half + border), (frame.under, middle), board_z)
-    cushion = shop.block("seat_single_surface", (-half, half), (middle, frame.height), (frame.rear, -frame.rear))
+    cushion = shop.block(
+        "seat_single_surface", (-half, half), (middle, frame.height), (frame.rear, -frame.rear)
+    )
     return [group("seat_surface", cushion), board]
 
 
@@ -28,7 +30,9 @@ def cushion_on_frame(shop: Workshop, frame) -> list[Piece]:
     middle = frame.under + frame.thick * shop.between(0.4, 0.6)
     half, bar = frame.width / 2, shop.between(0.025, 0.045)
     side = shop.block("seat_frame_bar", (half - bar, half), (frame.under, middle), (frame.rear, -frame.rear))
-    across = shop.block("seat_frame_bar", (bar - half, half - bar), (frame.under, middle), (-frame.rear - bar, -frame.rear))
+    across = shop.block(
+        "seat_frame_bar", (bar - half, half - bar), (frame.under, middle), (-frame.rear - bar, -frame.rear)
+    )
     rails = shop.both(side) + shop.row(across, (0, 0, 2 * frame.rear + bar), 2)
     border = shop.between(-0.01, 0.015)
     cushion = shop.block(
@@ -45,11 +49,15 @@ def slats(shop: Workshop, frame) -> list[Piece]:
     top, middle = frame.height, frame.height - shop.between(0.018, 0.025)
     if shop.chance(0.6):  # slats from side to side
         pitch = frame.depth / (count - 0.25)
-        first = shop.block("seat_surface_bar", (-half, half), (middle, top), (frame.rear, frame.rear + 0.75 * pitch))
+        first = shop.block(
+            "seat_surface_bar", (-half, half), (middle, top), (frame.rear, frame.rear + 0.75 * pitch)
+        )
         bars = shop.row(first, (0, 0, pitch), count)
         inset = shop.between(0.0, 0.04)
         side = (half - inset - rail, half - inset)
-        rails = shop.both(shop.block("seat_frame_bar", side, (frame.under, middle), (frame.rear, -frame.rear)))
+        rails = shop.both(
+            shop.block("seat_frame_bar", side, (frame.under, middle), (frame.rear, -frame.rear))
+        )
     else:
         pitch = frame.width / (count - 0.25)
         first = shop.block(
@@ -70,7 +78,9 @@ def cushions(people: int):
         middle, pitch = frame.height - frame.thick * shop.between(0.35, 0.6), frame.width / count
         left = (-frame.width / 2, -frame.width / 2 + pitch)
         overhang = shop.between(-0.01, 0.03)
-        first = shop.block("seat_single_surface", left, (middle, frame.height), (frame.rear, -frame.rear + overhang))
+        first = shop.block(
+            "seat_single_surface", left, (middle, frame.height), (frame.rear, -frame.rear + overhang)
+        )
         half = frame.width / 2
         box = shop.block("seat_support", (-half, half), (frame.under, middle), (frame.rear, -frame.rear))
         return [group("seat_surface", *shop.row(first, (pitch, 0, 0), count)), box]

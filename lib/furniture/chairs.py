@@ -43,10 +43,20 @@ def chair(workshop: Workshop) -> Piece:
 
 def dining(shop: Workshop) -> list[Piece]:
     """A chair for a table, with or without arms."""
-    frame = Frame(shop.between(0.40, 0.52), shop.between(0.40, 0.50), shop.between(0.42, 0.48), shop.between(0.03, 0.08))
+    frame = Frame(
+        shop.between(0.40, 0.52), shop.between(0.40, 0.50), shop.between(0.42, 0.48), shop.between(0.03, 0.08)
+    )
     frame.back, frame.lean = shop.between(0.32, 0.60), shop.pick(0, shop.between(0.05, 0.25), weights=(1, 3))
     base = shop.pick(
-        *(bases.legs, bases.runners, bases.cantilever, bases.pedestal, bases.crossed, bases.panels, bases.h_legs),
+        *(
+            bases.legs,
+            bases.runners,
+            bases.cantilever,
+            bases.pedestal,
+            bases.crossed,
+            bases.panels,
+            bases.h_legs,
+        ),
         weights=(10, 2, 2, 1.5, 1, 0.7, 1.3),
     )
     back = shop.pick(*backs.WOODEN, backs.slab, backs.panel_on_posts)
@@ -56,7 +66,9 @@ def dining(shop: Workshop) -> list[Piece]:
 
 def office(shop: Workshop) -> list[Piece]:
     """A swivel chair: a column on a star of legs, often on casters."""
-    frame = Frame(shop.between(0.44, 0.54), shop.between(0.44, 0.52), shop.between(0.42, 0.52), shop.between(0.05, 0.11))
+    frame = Frame(
+        shop.between(0.44, 0.54), shop.between(0.44, 0.52), shop.between(0.42, 0.52), shop.between(0.05, 0.11)
+    )
     frame.back, frame.lean = shop.between(0.35, 0.70), shop.between(0.0, 0.22)
     seat = shop.pick(seats.slab, seats.cushion_on_board)
     back = shop.pick(backs.slab, backs.panel_on_stem, backs.panel_on_posts, backs.winged)
@@ -91,7 +103,9 @@ def stool(shop: Workshop) -> list[Piece]:
 
 def lounge(shop: Workshop) -> list[Piece]:
     """A low, deep easy chair: rockers, sled runners, shells."""
-    frame = Frame(shop.between(0.54, 0.66), shop.between(0.52, 0.66), shop.between(0.34, 0.42), shop.between(0.06, 0.14))
+    frame = Frame(
+        shop.between(0.54, 0.66), shop.between(0.52, 0.66), shop.between(0.34, 0.42), shop.between(0.06, 0.14)
+    )
     frame.back, frame.lean = shop.between(0.45, 0.75), shop.between(0.15, 0.42)
     seat = shop.pick(seats.slab, seats.cushion_on_board, seats.cushion_on_frame, seats.slats)
     base = shop.pick(bases.legs, bases.rockers, bases.runners, bases.cantilever, bases.star, bases.h_legs)

@@ -37,15 +37,15 @@ class Piece:
         """(8, 3) corners of the box."""
         return self.center + SIGNS * self.size @ self.axes
 
-    def fit(self) -> None:
-        """Fit the boxes of this group and the groups below to the leaves."""
+    def fit(self) -> np.ndarray:
+        """Fit the boxes of this group and the groups below to their leaves; returns the leaves' corners, (n, 3)."""
         if not self.children:
-            return
-        for child in self.children:
-            child.fit()
-        corners = np.concatenate([child.corners() for child in self.children]) @ self.axes.T
-        low, high = corners.min(axis=0), corners.max(axis=0)
+            return self.corners()
+        corners = np.concatenate([child.fit() for child in self.children])
+        local = corners @ self.axes.T
+        low, high = local.min(axis=0), local.max(axis=0)
         self.center, self.size = (low + high) / 2 @ self.axes, high - low
+        return corners
 
     def walk(self) -> Iterable["Piece"]:
         """This piece and all below it, parents first."""
@@ -115,7 +115,9 @@ class Workshop:
             return replace(piece, children=children, axes=axes)
         errors = np.clip(self.rng.standard_normal(6), -2, 2) * COPY_ERROR
         center = piece.center * MIRROR_X if mirrored else piece.center
-        return replace(piece, axes=axes, center=center + move + errors[3:], size=piece.size * (1 + errors[:3]))
+        return replace(
+            piece, axes=axes, center=center + move + errors[3:], size=piece.size * (1 + errors[:3])
+        )
 
 
 MIRROR_X = np.array([-1.0, 1.0, 1.0])
@@ -156,7 +158,8 @@ def tilt(piece: Piece, angle: float, pivot: tuple[float, float]) -> Piece:
 
 
 def _is_thin_crossbar(size: np.ndarray) -> bool:
-    return max(size[1], size[2]) < 0.06 and size[0] > 3 * max(size[1], size[2])
+    thick = max(size[1], size[2])
+    return bool(thick < 0.06 and size[0] > 3 * thick)
 
 
 def finish(root: Piece, workshop: Workshop, category: str, name: str) -> PartGraph:

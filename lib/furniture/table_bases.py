@@ -63,9 +63,13 @@ def trestle(shop: Workshop, frame) -> list[Piece]:
     end = [shop.block("foot", sides, (0, high), (-deep, deep))]
     beam = high if shop.chance(0.6) else 0.0
     if beam:
-        end.append(shop.block("bar_stretcher", sides, (frame.under - high, frame.under), (-deep * 0.9, deep * 0.9)))
+        end.append(
+            shop.block("bar_stretcher", sides, (frame.under - high, frame.under), (-deep * 0.9, deep * 0.9))
+        )
     column_z = shop.pick(0.0, deep * 0.45)
-    column = shop.block("leg", sides, (high, frame.under - beam), (column_z - thick / 2 - 0.02, column_z + thick / 2 + 0.02))
+    column = shop.block(
+        "leg", sides, (high, frame.under - beam), (column_z - thick / 2 - 0.02, column_z + thick / 2 + 0.02)
+    )
     end += [column] if not column_z else [column, shop.copy(column, (0, 0, -2 * column_z))]
     pieces = shop.both(group("leg", *end)) if shop.chance(0.5) else shop.both(*end)
     y = frame.under * shop.between(0.2, 0.75)
@@ -140,9 +144,15 @@ def panels(shop: Workshop, frame) -> list[Piece]:
         pieces.append(shop.block("back_panel", (-inner, inner), (low, frame.under), (place, place + 0.022)))
     if shop.chance(0.4):
         y = frame.under * shop.between(0.1, 0.5)
-        pieces.append(shop.block("shelf", (-inner, inner), (y, y + 0.022), (-z + 0.025, z * shop.between(0.5, 1))))
+        pieces.append(
+            shop.block("shelf", (-inner, inner), (y, y + 0.022), (-z + 0.025, z * shop.between(0.5, 1)))
+        )
         if shop.chance(0.4):
-            pieces.append(shop.block("vertical_divider_panel", (-0.011, 0.011), (y + 0.022, frame.under), (-z + 0.025, z * 0.5)))
+            pieces.append(
+                shop.block(
+                    "vertical_divider_panel", (-0.011, 0.011), (y + 0.022, frame.under), (-z + 0.025, z * 0.5)
+                )
+            )
     return pieces
 
 
@@ -201,7 +211,12 @@ def drawer(shop: Workshop, label: str, x: tuple, y: tuple, z: tuple) -> Piece:
         middle_x -= np.sign(middle_x + 1e-9) * (abs(x[1] - x[0]) / 2 - 0.035)
         wide, high = high, wide
     body = shop.block("other", x, y, (min(z), front))
-    handle = shop.block("other", (middle_x - wide, middle_x + wide), (middle_y - high, middle_y + high), (front, front + 0.022))
+    handle = shop.block(
+        "other",
+        (middle_x - wide, middle_x + wide),
+        (middle_y - high, middle_y + high),
+        (front, front + 0.022),
+    )
     return group(label, body, handle)
 
 
@@ -213,9 +228,15 @@ def _tower(shop: Workshop, frame, outer: float, inner: float) -> list[Piece]:
         shop.block("vertical_side_panel", (inner, inner + thick), (0, frame.under), (-z, z)),
         shop.block("bottom_panel", (inner + thick, outer - thick), (low, low + thick), (-z, z)),
     ]
-    x, bottom, style = (inner + thick + 0.003, outer - thick - 0.003), low + thick, shop.pick("drawers", "door", weights=(3, 1))
+    x, bottom, style = (
+        (inner + thick + 0.003, outer - thick - 0.003),
+        low + thick,
+        shop.pick("drawers", "door", weights=(3, 1)),
+    )
     if style == "door":
-        return pieces + [drawer(shop, "cabinet_door", x, (bottom + 0.003, frame.under - 0.003), (z - 0.02, z))]
+        return pieces + [
+            drawer(shop, "cabinet_door", x, (bottom + 0.003, frame.under - 0.003), (z - 0.02, z))
+        ]
     count = shop.pick(2, 3, 4)
     pitch = (frame.under - bottom) / count
     first = drawer(shop, "drawer", x, (bottom + 0.003, bottom + pitch - 0.003), (-z * 0.9, z))
@@ -251,7 +272,9 @@ def one_tower(shop: Workshop, frame) -> list[Piece]:
     else:
         side = -1.0
     if shop.chance(0.5):
-        pieces.append(shop.block("vertical_side_panel", (side * x, side * (x - 0.025)), (0, frame.under), (-z, z)))
+        pieces.append(
+            shop.block("vertical_side_panel", (side * x, side * (x - 0.025)), (0, frame.under), (-z, z))
+        )
         if shop.chance(0.6):
             pieces.append(_modesty_panel(shop, frame, *sorted((side * (x - 0.025), -side * inner)), -z))
         return pieces
@@ -297,3 +320,6 @@ def keyboard_desk(shop: Workshop, frame) -> list[Piece]:
     if shop.chance(0.5):
         pieces.append(shop.block("shelf", (thick - x, x - thick), (0.08, 0.1), (-z, 0)))
     return pieces
+
+
+CENTRAL = (pedestal, two_pedestals, tripod)  # what touches the top in the middle only

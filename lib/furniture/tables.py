@@ -18,6 +18,7 @@ class Frame:
     height: float
     thick: float
     overhang: float = 0.0  # of the top beyond the base
+    central: bool = False  # is the base in the middle only?
 
     @property
     def under(self) -> float:
@@ -34,6 +35,7 @@ def table(workshop: Workshop) -> Piece:
     """One table of a kind drawn at random."""
     kind = workshop.pick(dining, coffee, side, console, desk, weights=(28, 22, 18, 10, 24))
     frame, top, base = kind(workshop)
+    frame.central = base in bases.CENTRAL
     pieces = [group("tabletop", *top(workshop, frame)), group("table_base", *base(workshop, frame))]
     if workshop.chance(0.8):
         return group("table", group("regular_table", *pieces))
@@ -43,10 +45,22 @@ def table(workshop: Workshop) -> Piece:
 def dining(shop: Workshop):
     """A table to sit at."""
     width = shop.between(0.9, 2.0)
-    depth = shop.pick(shop.between(0.75, 1.0), width, weights=(3, 1)) if width < 1.4 else shop.between(0.75, 1.0)
-    frame = Frame(width, min(depth, width), shop.between(0.7, 0.78), shop.between(0.025, 0.06), shop.between(0.0, 0.12))
+    depth = (
+        shop.pick(shop.between(0.75, 1.0), width, weights=(3, 1)) if width < 1.4 else shop.between(0.75, 1.0)
+    )
+    frame = Frame(
+        width, min(depth, width), shop.between(0.7, 0.78), shop.between(0.025, 0.06), shop.between(0.0, 0.12)
+    )
     base = shop.pick(
-        *(bases.legs, bases.trestle, bases.pedestal, bases.two_pedestals, bases.crossed, bases.panels, bases.frames),
+        *(
+            bases.legs,
+            bases.trestle,
+            bases.pedestal,
+            bases.two_pedestals,
+            bases.crossed,
+            bases.panels,
+            bases.frames,
+        ),
         weights=(8, 3, 3, 1.5, 1.5, 1.5, 1.5),
     )
     return frame, shop.pick(slab, planks, framed, glass, leaves, slab_on_apron), base
@@ -58,7 +72,15 @@ def coffee(shop: Workshop):
     depth = shop.pick(width * shop.between(0.45, 0.7), width)
     frame = Frame(width, depth, shop.between(0.3, 0.48), shop.between(0.025, 0.08), shop.between(0.0, 0.08))
     base = shop.pick(
-        *(bases.legs, bases.shelf_legs, bases.pedestal, bases.crossed, bases.panels, bases.frames, bases.cube),
+        *(
+            bases.legs,
+            bases.shelf_legs,
+            bases.pedestal,
+            bases.crossed,
+            bases.panels,
+            bases.frames,
+            bases.cube,
+        ),
         weights=(4, 4, 1.5, 1, 2, 2, 1),
     )
     return frame, shop.pick(slab, planks, framed, glass, glass, slab_on_apron), base
@@ -67,10 +89,23 @@ def coffee(shop: Workshop):
 def side(shop: Workshop):
     """A small table beside a bed or a chair."""
     width = shop.between(0.35, 0.6)
-    frame = Frame(width, width * shop.pick(1.0, shop.between(0.8, 1.0)), shop.between(0.45, 0.75), shop.between(0.02, 0.045))
+    frame = Frame(
+        width,
+        width * shop.pick(1.0, shop.between(0.8, 1.0)),
+        shop.between(0.45, 0.75),
+        shop.between(0.02, 0.045),
+    )
     frame.overhang = shop.between(0.0, 0.05)
     base = shop.pick(
-        *(bases.legs, bases.shelf_legs, bases.pedestal, bases.tripod, bases.drawer_box, bases.c_frame, bases.panels),
+        *(
+            bases.legs,
+            bases.shelf_legs,
+            bases.pedestal,
+            bases.tripod,
+            bases.drawer_box,
+            bases.c_frame,
+            bases.panels,
+        ),
         weights=(3, 3, 3, 1.5, 2, 1, 1),
     )
     return frame, shop.pick(slab, slab, framed, glass, slab_on_apron), base
@@ -79,17 +114,38 @@ def side(shop: Workshop):
 def console(shop: Workshop):
     """A narrow table against a wall, or a bench-like one."""
     width = shop.between(0.9, 1.5)
-    frame = Frame(width, shop.between(0.3, 0.42), shop.between(0.7, 0.95), shop.between(0.025, 0.06), shop.between(0, 0.05))
-    base = shop.pick(bases.legs, bases.shelf_legs, bases.drawer_box, bases.panels, bases.frames, bases.trestle)
+    frame = Frame(
+        width,
+        shop.between(0.3, 0.42),
+        shop.between(0.7, 0.95),
+        shop.between(0.025, 0.06),
+        shop.between(0, 0.05),
+    )
+    base = shop.pick(
+        bases.legs, bases.shelf_legs, bases.drawer_box, bases.panels, bases.frames, bases.trestle
+    )
     return frame, shop.pick(slab, slab, framed, planks, slab_on_apron), base
 
 
 def desk(shop: Workshop):
     """A writing desk."""
     width = shop.between(1.1, 1.8)
-    frame = Frame(width, shop.between(0.55, 0.8), shop.between(0.7, 0.78), shop.between(0.025, 0.05), shop.between(0, 0.04))
+    frame = Frame(
+        width,
+        shop.between(0.55, 0.8),
+        shop.between(0.7, 0.78),
+        shop.between(0.025, 0.05),
+        shop.between(0, 0.04),
+    )
     base = shop.pick(
-        *(bases.drawer_towers, bases.one_tower, bases.drawer_box, bases.panels, bases.frames, bases.keyboard_desk),
+        *(
+            bases.drawer_towers,
+            bases.one_tower,
+            bases.drawer_box,
+            bases.panels,
+            bases.frames,
+            bases.keyboard_desk,
+        ),
         weights=(4, 4, 3, 2, 2, 1.5),
     )
     return frame, shop.pick(slab, slab, slab, framed, slab_with_riser), base
@@ -112,8 +168,7 @@ def slab(shop: Workshop, frame: Frame) -> list[Piece]:
 def planks(shop: Workshop, frame: Frame) -> list[Piece]:
     """Boards side by side, lengthwise or across, on two bars."""
     count, bar, x, z = shop.pick(3, 4, 5, 6), 0.025, frame.width / 2, frame.depth / 2
-    y, low = (frame.under + bar, frame.height), (frame.under, frame.under + bar)
-    frame.height, y = frame.height + bar, (y[0], y[1] + bar)
+    y, low = (frame.under, frame.height), (frame.under - bar, frame.under)
     if shop.chance(0.5):
         pitch = frame.depth / (count - 0.05)
         first, step = shop.block("board", (-x, x), y, (-z, -z + 0.95 * pitch)), (0, 0, pitch)
@@ -122,7 +177,11 @@ def planks(shop: Workshop, frame: Frame) -> list[Piece]:
         pitch = frame.width / (count - 0.05)
         first, step = shop.block("board", (-x, -x + 0.95 * pitch), y, (-z, z)), (pitch, 0, 0)
         bar_z = z * 0.7
-        bars = shop.row(shop.block("bar", (-x * 0.95, x * 0.95), low, (-bar_z, -bar_z + 0.06)), (0, 0, 2 * bar_z - 0.06), 2)
+        bars = shop.row(
+            shop.block("bar", (-x * 0.95, x * 0.95), low, (-bar_z, -bar_z + 0.06)),
+            (0, 0, 2 * bar_z - 0.06),
+            2,
+        )
     return [group("tabletop_surface", *shop.row(first, step, count)), group("tabletop_frame", *bars)]
 
 
@@ -130,7 +189,9 @@ def _ring(shop: Workshop, label: str, half: tuple[float, float], y: tuple, wide:
     """Four bars around a rectangle with these half sides."""
     x, z = half
     sides = shop.both(shop.block(label, (x - wide, x), y, (-z, z)))
-    return sides + shop.row(shop.block(label, (wide - x, x - wide), y, (z - wide, z)), (0, 0, wide - 2 * z), 2)
+    return sides + shop.row(
+        shop.block(label, (wide - x, x - wide), y, (z - wide, z)), (0, 0, wide - 2 * z), 2
+    )
 
 
 def framed(shop: Workshop, frame: Frame) -> list[Piece]:
@@ -144,12 +205,12 @@ def framed(shop: Workshop, frame: Frame) -> list[Piece]:
 
 def glass(shop: Workshop, frame: Frame) -> list[Piece]:
     """A pane of glass, lying free, in a ring of bars, or on two bars."""
-    style = shop.pick("free", "ring", "bars")
+    style = shop.pick("free", "ring") if frame.central else shop.pick("free", "ring", "bars")
     if style == "free":
         return [group("tabletop_surface", _board(shop, frame, "glass", (frame.under, frame.height)))]
     if style == "ring":
         wide = shop.between(0.03, 0.06)
-        pane = _board(shop, frame, "glass", (frame.height - 0.6 * frame.thick, frame.height), wide)
+        pane = _board(shop, frame, "glass", (frame.under + 0.005, frame.height - 0.003), wide)
         bars = _ring(shop, "bar", (frame.width / 2, frame.depth / 2), (frame.under, frame.height), wide)
     else:
         middle = frame.under + frame.thick / 2
@@ -160,11 +221,10 @@ def glass(shop: Workshop, frame: Frame) -> list[Piece]:
 
 
 def slab_on_apron(shop: Workshop, frame: Frame) -> list[Piece]:
-    """A board on an apron of four bars."""
+    """A board with an apron of four bars below it, around the ends of the legs."""
     apron, y = shop.between(0.04, 0.09), frame.under
     board = _board(shop, frame, "board", (y, frame.height))
     bars = _ring(shop, "bar", frame.base, (y - apron, y), shop.between(0.018, 0.03))
-    frame.thick += apron  # the legs end below the apron, or run up inside it
     return [group("tabletop_surface", board), group("tabletop_frame", *bars)]
 
 
@@ -174,9 +234,16 @@ def leaves(shop: Workshop, frame: Frame) -> list[Piece]:
     board = _board(shop, frame, "board", y)
     if shop.chance(0.5):
         low = frame.height - leaf * shop.between(0.8, 1.3)
-        side = shop.block("tabletop_dropleaf", (middle, middle + 0.022), (low, frame.height), (-frame.depth / 2, frame.depth / 2))
+        side = shop.block(
+            "tabletop_dropleaf",
+            (middle, middle + 0.022),
+            (low, frame.height),
+            (-frame.depth / 2, frame.depth / 2),
+        )
     else:
-        side = shop.block("tabletop_dropleaf", (middle, middle + leaf), y, (-frame.depth / 2, frame.depth / 2))
+        side = shop.block(
+            "tabletop_dropleaf", (middle, middle + leaf), y, (-frame.depth / 2, frame.depth / 2)
+        )
     return [group("tabletop_surface", board), *shop.both(side)]
 
 

@@ -17,7 +17,8 @@ MAY_IMPORT = {  # part of lib -> the parts it may import beside itself
     "training": [*GEOMETRY, *LANGUAGES],
     "viewing": [*GEOMETRY, *LANGUAGES],
     "exercises": [*GEOMETRY, *LANGUAGES],
-    "datasets": ["extractor", *LANGUAGES],
+    "furniture": ["extractor", *LANGUAGES],
+    "datasets": ["extractor", "furniture", *LANGUAGES],
 }
 LANGUAGE_LIBRARIES = {"torch", "numpy", "jaxtyping", "trimesh"} | {  # and of the standard library:
     *(

@@ -288,8 +288,12 @@ def test_an_unknown_category_names_the_choices(tmp_path):
         read_many(tmp_path, "sofa")  # at once, not for every file
 
 
-def test_the_deepest_and_the_largest_graph_are_read(time_limit, unchecked_shapes):
-    assert len(list(PartGraph.from_json(nested(MOST_LEVELS)).root.walk())) == MOST_LEVELS
+def test_the_deepest_graph_is_read_and_written():
+    graph = PartGraph.from_json(nested(MOST_LEVELS))
+    assert len(list(PartGraph.from_json(graph.to_json()).root.walk())) == MOST_LEVELS
+
+
+def test_the_largest_graph_is_read(time_limit, unchecked_shapes):
     with time_limit(60):
         graph = PartGraph.from_json(chair(children=[{"label": "leg", "box": BOX}] * (MOST_PARTS - 1)))
     assert len(graph.leaves) == MOST_PARTS - 1
@@ -526,6 +530,14 @@ def test_an_archive_that_changes_is_opened_anew(tmp_path):
     assert sources(path) == ["a"]
     time.sleep(0.01)  # clocks of file systems are coarse
     assert sources(archive(path, {"b.json": TEXT, "c.json": TEXT})) == ["b", "c"]
+
+
+def test_a_forked_process_opens_an_archive_of_its_own(tmp_path, monkeypatch):
+    path = archive(tmp_path / "a.zip", {"a.json": TEXT})
+    parents = partgraph_files._archive(path)
+    assert partgraph_files._archive(path) is parents
+    monkeypatch.setattr("os.getpid", lambda: -1)
+    assert partgraph_files._archive(path) is not parents
 
 
 # From programs

@@ -73,15 +73,21 @@ def connecting_contacts(boxes: Cuboids, size: Float[Tensor, "3"]) -> list[Contac
             return contacts
 
 
-def floating(count: int, contacts: list[Contact]) -> set[int]:
-    """The cuboids that no chain of contacts joins to the bounding box."""
-    reached, found = {BOTTOM, TOP}, True
+def floating(count: int, contacts: list[Contact], holds: dict[int, set[int]] | None = None) -> set[int]:
+    """The cuboids that no chain of contacts joins to the bounding box.
+
+    holds   for some cuboids the partners that may hold them; others are held by whatever they touch
+    """
+    holds, standing, found = holds or {}, {BOTTOM, TOP}, True
     while found:
         found = {
-            i for c in contacts for i in (c.first, c.second) if c.partner(i) in reached and i not in reached
+            i
+            for c in contacts
+            for i in (c.first, c.second)
+            if i not in standing and c.partner(i) in standing and c.partner(i) in holds.get(i, (c.partner(i),))
         }
-        reached |= found
-    return set(range(count)) - reached
+        standing |= found
+    return set(range(count)) - standing
 
 
 def find_contacts(

@@ -135,7 +135,13 @@ def place(facts: BlockFacts, options: Options):
     """How each written part is held, in grounded order. Raises RejectedError ("disconnected")."""
     written, standing = facts.written, {BOTTOM, TOP, *facts.written}
     contacts = [c for c in facts.contacts if c.first in standing and c.second in standing]
-    ways = [way for i in written for way in ways_to_place(i, contacts, facts.boxes, facts.size, not facts.aligned[i], options.macros)]
+    holds = {group.members[0]: group.holds for group in facts.groups}
+    ways = [
+        way
+        for i in written
+        for way in ways_to_place(i, contacts, facts.boxes, facts.size, not facts.aligned[i], options.macros)
+        if holds.get(i, standing).issuperset(way.partners)
+    ]
     misfits = judge(ways, facts.boxes, facts.aligned, facts.size).tolist()
     own = {i: [] for i in written}
     for way, misfit in zip(ways, misfits):

@@ -2,8 +2,8 @@
 
 A box looks the same under 24 ways to call its axes right, top and front. We take the one that needs the smallest
 turn from upright, because an attachment also turns a cuboid by as little as it can. Boxes within five degrees of
-upright are put exactly upright (paper, section 5.1); for a bar with a square cross-section only the direction of the
-bar counts, since its roll is arbitrary.
+upright are put exactly upright (paper, section 5.1); for a thin bar with a square cross-section only the direction
+of the bar counts, since its roll is arbitrary and hardly seen.
 """
 
 from itertools import permutations, product
@@ -17,6 +17,7 @@ from .partgraph import Part, PartGraph, stack
 
 UPRIGHT = 0.9961947  # cosine of five degrees (the paper's allowance; the authors' program: 0.995)
 SQUARE = 0.1  # sides that differ by less than this share of the longer one make a square cross-section
+THIN = 0.1  # sides below this share of its length make a bar thin (the authors' program straightens thick ones too)
 
 
 def _turns() -> Float[Tensor, "24 3 3"]:
@@ -45,8 +46,9 @@ def is_upright(boxes: Cuboids) -> Bool[Tensor, " n"]:
     """Which boxes, their axes renamed, count as standing upright in their frame."""
     straight = torch.diagonal(boxes.axes, dim1=-2, dim2=-1) >= UPRIGHT
     first, second = boxes.size[:, [1, 2, 0]], boxes.size[:, [2, 0, 1]]  # the cross-section across axis 0, 1, 2
-    square = (first - second).abs() < SQUARE * torch.maximum(first, second)
-    return straight.all(-1) | (square & straight).any(-1) | square.all(-1)
+    thicker = torch.maximum(first, second)
+    square_bar = ((first - second).abs() < SQUARE * thicker) & (thicker < THIN * boxes.size)
+    return straight.all(-1) | (square_bar & straight).any(-1)
 
 
 def snap(boxes: Cuboids) -> Cuboids:

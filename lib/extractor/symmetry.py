@@ -5,12 +5,15 @@ spaced, along the x, y or z axis of the block's box, and (iii) so are the places
 member of a group is written down; `reflect` or `translate` makes the others.
 
 The longest rows (three and more members) are taken first, then mirrored pairs about X, Y, Z, then rows of two. Inner
-parts are compared with all that is in them, as the language would copy it. For (i) we look away from more than the
-paper does: members may touch each other, and the first and last slat of a row what comes before and after the row.
-A copy is attached to what its source is attached to; all that matters is that nothing loses its only hold.
+parts are compared with all that is in them, as the language would copy it.
+
+Condition (i) of the paper keeps copies from going where they hold something that would fall without them. We ask for
+exactly that, and so find more groups: members must touch at least one part in common, at corresponding places (the
+source is then held by such parts only, since its copies will be too), and without the copies everything else must
+still hang together. The first slat of a row may touch the seat, and the last one the head.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Bool, Float
@@ -18,10 +21,12 @@ from torch import Tensor
 
 from ..interpreters.cuboids import Cuboids
 from ..interpreters.shapeassembly.program import AXES
-from .contacts import BOTTOM, TOP, Contact
+from .contacts import BOTTOM, TOP, Contact, floating
 from .partgraph import Part, stack
 
-ALIKE = 0.03  # share of the block's longest side: how far corners of a copy may lie from where they should
+ALIKE = 0.015  # share of the block's longest side: how far corners of a copy may lie from where they should
+UNEVEN = 0.1  # share of the spacing of a row: how far a member may be from its place (the authors' program)
+NEARLY_NOTHING = 1e-6  # world units
 SAME_POINT = 0.1  # the same for the places where copies touch other parts (the authors' program: 0.1 of about 1)
 
 
@@ -33,11 +38,11 @@ class Group:
     axis: str
     members: tuple[int, ...]
     distance: float = 0.0  # of the last member of a row from the first, as a share of the block's side
+    holds: frozenset[int] = frozenset()  # parts that hold the source, as their images hold the copies
 
 
 def find_groups(parts: list[Part], boxes: Cuboids, contacts: list[Contact], size: Float[Tensor, "3"]) -> list[Group]:
     """Groups of a block's parts; `boxes` are their boxes (n), straightened. No part is in two groups."""
-    surroundings = Surroundings(len(parts), contacts, float(size.max()))
     mirrored = [mirror_images(parts, boxes, axis, size) for axis in range(3)]
     rows = [row for axis in range(3) for row in find_rows(parts, boxes, axis, size)]
     candidates = sorted((row for row in rows if len(row.members) > 2), key=lambda row: -len(row.members))
@@ -45,49 +50,49 @@ def find_groups(parts: list[Part], boxes: Cuboids, contacts: list[Contact], size
         Group("reflect", AXES[axis], (i, j)) for axis in range(3) for i, j in mirrored[axis].nonzero().tolist()
     ]
     candidates += [row for row in rows if len(row.members) == 2]
-    taken: set[int] = set()
-    groups = []
+    touched = touched_parts(len(parts), contacts)
+    groups: list[Group] = []
     for group in candidates:
-        if taken.isdisjoint(group.members) and surroundings.agree(group, boxes):
-            groups.append(group)
-            taken.update(group.members)
+        if any(not set(group.members).isdisjoint(other.members) for other in groups):
+            continue
+        holds = common_holds(group, touched, boxes, SAME_POINT * float(size.max()))
+        more = [*groups, replace(group, holds=frozenset(holds))]
+        if holds and not falling(len(parts), contacts, more):
+            groups = more
     return groups
 
 
-class Surroundings:
-    """What each part of a block touches, and where."""
+def falling(count: int, contacts: list[Contact], groups: list[Group]) -> set[int]:
+    """The parts that would hang on nothing if of each group only the source were written down."""
+    copies = {member for group in groups for member in group.members[1:]}
+    left = [contact for contact in contacts if copies.isdisjoint((contact.first, contact.second))]
+    return floating(count, left, {group.members[0]: group.holds for group in groups}) - copies
 
-    def __init__(self, count: int, contacts: list[Contact], longest: float):
-        self.touched: list[dict[int, Tensor]] = [{} for _ in range(count)]  # partner -> place
-        self.tolerance = SAME_POINT * longest
-        for contact in contacts:
-            place = torch.tensor(contact.point, dtype=torch.float64)
-            for cuboid in (contact.first, contact.second):
-                if contact.firm and cuboid not in (BOTTOM, TOP):
-                    self.touched[cuboid][contact.partner(cuboid)] = place
 
-    def agree(self, group: Group, boxes: Cuboids) -> bool:
-        """Conditions (i) and (iii): all members touch the same parts outside the group, at corresponding places."""
-        outside = [self.touched[member].keys() - set(group.members) for member in group.members]
-        shared = set.intersection(*outside)
-        ends = (0, len(outside) - 1) if len(outside) > 2 else ()
-        extra = {partner for k, touched in enumerate(outside) for partner in touched - shared if k in ends}
-        if not shared or any(touched - shared and k not in ends for k, touched in enumerate(outside)):
-            return False
-        if any(self.touched[partner].keys() <= set(group.members) for partner in extra if partner >= 0):
-            return False
-        return all(self._same_places(group, member, shared, boxes) for member in group.members[1:])
+def touched_parts(count: int, contacts: list[Contact]) -> list[dict[int, Tensor]]:
+    """For each part the parts (or BOTTOM, TOP) that it touches, and where."""
+    touched: list[dict[int, Tensor]] = [{} for _ in range(count)]
+    for contact in contacts:
+        place = torch.tensor(contact.point, dtype=torch.float64)
+        for cuboid in (contact.first, contact.second):
+            if contact.firm and cuboid not in (BOTTOM, TOP):
+                touched[cuboid][contact.partner(cuboid)] = place
+    return touched
 
-    def _same_places(self, group: Group, member: int, partners: set[int], boxes: Cuboids) -> bool:
-        """Does a copy touch its partners where the image of the source would?"""
-        source, axis = group.members[0], AXES.index(group.axis)
+
+def common_holds(group: Group, touched: list[dict[int, Tensor]], boxes: Cuboids, tolerance: float) -> set[int]:
+    """The parts outside the group that all its members touch, at corresponding places."""
+    source, axis = group.members[0], AXES.index(group.axis)
+    common = touched[source].keys() - set(group.members)
+    for member in group.members[1:]:
         shift = boxes.center[member, axis] - boxes.center[source, axis]
-        for partner in partners:
-            wanted = self.touched[source][partner].clone()
+        for partner in list(common):
+            wanted = touched[source][partner].clone()
             wanted[axis] = -wanted[axis] if group.kind == "reflect" else wanted[axis] + shift
-            if float((wanted - self.touched[member][partner]).norm()) > self.tolerance:
-                return False
-        return True
+            there = touched[member].get(partner)
+            if there is None or float((wanted - there).norm()) > tolerance:
+                common.discard(partner)
+    return common
 
 
 def mirror_images(parts: list[Part], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> Bool[Tensor, "n n"]:
@@ -134,18 +139,18 @@ def even_runs(row: list[int], position: list[float], tolerance: float) -> list[l
     runs, start = [], 0
     while start < len(row) - 1:
         stop = start + 2
-        step = position[row[start + 1]] - position[row[start]]
-        while stop < len(row):
-            longer = row[start : stop + 1]
-            step = (position[longer[-1]] - position[longer[0]]) / (len(longer) - 1)
-            off = max(abs(position[part] - position[longer[0]] - k * step) for k, part in enumerate(longer))
-            if off > tolerance:
-                break
+        while stop < len(row) and _even([position[part] for part in row[start : stop + 1]], tolerance):
             stop += 1
-        if position[row[start + 1]] - position[row[start]] > tolerance:  # two at one place are no row
+        if position[row[start + 1]] - position[row[start]] > NEARLY_NOTHING:  # two at one place are no row
             runs.append(row[start:stop])
         start = stop
     return runs
+
+
+def _even(places: list[float], tolerance: float) -> bool:
+    step = (places[-1] - places[0]) / (len(places) - 1)
+    allowed = min(tolerance, UNEVEN * step)
+    return max(abs(place - places[0] - k * step) for k, place in enumerate(places)) <= allowed
 
 
 def corner_gap(a: Float[Tensor, "n 8 3"], b: Float[Tensor, "m 8 3"]) -> Float[Tensor, "n m"]:

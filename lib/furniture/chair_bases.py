@@ -140,8 +140,8 @@ def h_legs(shop: Workshop, frame) -> list[Piece]:
 
 def pedestal(shop: Workshop, frame) -> list[Piece]:
     """A column on a plate, like a tulip."""
-    radius, plate = min(frame.width, frame.depth) / 2 * shop.between(0.75, 1.05), shop.between(0.02, 0.05)
-    column = shop.between(0.025, 0.07)
+    radius, plate = min(frame.width, frame.depth) / 2 * shop.between(0.7, 0.95), shop.between(0.02, 0.04)
+    column = shop.between(0.022, 0.05)
     pieces = [
         shop.block("pedestal", (-radius, radius), (0, plate), (-radius, radius)),
         shop.block("central_support", (-column, column), (plate, frame.under), (-column, column)),
@@ -163,7 +163,7 @@ def star(shop: Workshop, frame) -> list[Piece]:
     """A column on three to six legs, often on casters, often with a mechanism under the seat."""
     count, casters = shop.pick(3, 4, 5, 6, weights=(0.5, 3, 4, 0.5)), shop.chance(0.6)
     column, top, pieces = shop.between(0.022, 0.04), frame.under, []
-    if shop.chance(0.4) and top > 0.2:
+    if shop.chance(0.3) and top > 0.2:
         top -= 0.04
         plate = shop.block("seat_support", (-0.09, 0.09), (top, frame.under), (-0.1, 0.1))
         lever = shop.block("lever", (0.09, 0.2), (top + 0.01, top + 0.03), (0, 0.02))

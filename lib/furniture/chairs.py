@@ -6,6 +6,7 @@ stool, lounge chair) says only which choices and proportions go together.
 
 from dataclasses import dataclass
 
+from . import chair_arms
 from . import chair_backs as backs
 from . import chair_bases as bases
 from . import chair_seats as seats
@@ -60,8 +61,8 @@ def dining(shop: Workshop) -> list[Piece]:
         weights=(10, 2, 2, 1.5, 1, 0.7, 1.3),
     )
     back = shop.pick(*backs.WOODEN, backs.slab, backs.panel_on_posts)
-    arms = shop.pick(None, backs.arms, weights=(3, 2))
-    return _assemble(shop, frame, shop.pick(*seats.FIRM), base, back, arms, headrest=0.03)
+    arms = shop.pick(None, chair_arms.wooden, weights=(3, 2))
+    return _assemble(shop, frame, shop.pick(*seats.FIRM), base, back, arms, headrest=0.08)
 
 
 def office(shop: Workshop) -> list[Piece]:
@@ -72,7 +73,7 @@ def office(shop: Workshop) -> list[Piece]:
     frame.back, frame.lean = shop.between(0.35, 0.70), shop.between(0.0, 0.22)
     seat = shop.pick(seats.slab, seats.cushion_on_board)
     back = shop.pick(backs.slab, backs.panel_on_stem, backs.panel_on_posts, backs.winged)
-    arms = shop.pick(None, backs.arms, weights=(1, 1.3))
+    arms = shop.pick(None, chair_arms.wooden, weights=(1, 1.3))
     return _assemble(shop, frame, seat, bases.star, back, arms, headrest=0.2)
 
 
@@ -85,16 +86,16 @@ def sofa(shop: Workshop) -> list[Piece]:
     seat = seats.cushions(people)
     back = shop.pick(backs.slab, backs.cushions(people), backs.winged if people == 1 else backs.slab)
     base = shop.pick(bases.feet, bases.plinth, bases.low_runners, weights=(3, 1, 1))
-    arms = shop.pick(None, backs.sofa_arms, weights=(1, 5))
+    arms = shop.pick(None, chair_arms.upholstered, weights=(1, 5))
     return _assemble(shop, frame, seat, base, back, arms, headrest=0.06)
 
 
 def stool(shop: Workshop) -> list[Piece]:
     """A bar stool or a low one, seldom with a low back."""
-    side, tall = shop.between(0.32, 0.44), shop.chance(0.6)
+    side, tall = shop.between(0.3, 0.4), shop.chance(0.75)
     height = shop.between(0.60, 0.78) if tall else shop.between(0.38, 0.5)
     frame = Frame(side, side * shop.between(0.9, 1.0), height, shop.between(0.03, 0.1))
-    back = shop.pick(None, backs.slab, backs.rail, backs.panel_on_posts, weights=(4, 1, 1, 1))
+    back = shop.pick(None, backs.slab, backs.rail, backs.panel_on_posts, weights=(3, 1, 1, 1))
     if back:
         frame.back, frame.lean = shop.between(0.16, 0.32), shop.between(0, 0.15)
     base = shop.pick(bases.legs, bases.tripod, bases.pedestal, bases.star, bases.crossed, bases.runners)
@@ -110,7 +111,7 @@ def lounge(shop: Workshop) -> list[Piece]:
     seat = shop.pick(seats.slab, seats.cushion_on_board, seats.cushion_on_frame, seats.slats)
     base = shop.pick(bases.legs, bases.rockers, bases.runners, bases.cantilever, bases.star, bases.h_legs)
     back = shop.pick(backs.slab, backs.panel_on_posts, backs.ladder, backs.spindles, backs.winged)
-    arms = shop.pick(None, backs.arms, backs.sofa_arms, weights=(1, 4, 1))
+    arms = shop.pick(None, chair_arms.wooden, chair_arms.upholstered, weights=(1, 4, 1))
     return _assemble(shop, frame, seat, base, back, arms, headrest=0.15)
 
 
@@ -119,7 +120,7 @@ def _assemble(shop: Workshop, frame: Frame, seat, base, back, arms, headrest: fl
     pieces = [group("chair_base", *base(shop, frame)), group("chair_seat", *seat(shop, frame))]
     if back:
         pieces.append(backs.leaning(shop, frame, group("chair_back", *back(shop, frame))))
-        if shop.chance(headrest):
+        if back in backs.PADDED and shop.chance(headrest):
             pieces.append(backs.leaning(shop, frame, group("chair_head", *backs.head(shop, frame))))
     if arms:
         pieces += arms(shop, frame)

@@ -20,7 +20,6 @@ class Carcass:
     depth: float
     board: float  # thickness of its panels
     backed: bool = True  # has a back panel
-    base_label: str = ""
 
     @property
     def inside(self) -> tuple[tuple, tuple, tuple]:
@@ -44,7 +43,7 @@ def bookcase(shop: Workshop) -> list[Piece]:
     """Open shelves in one to three columns, or cubes."""
     width, height = shop.between(0.5, 1.3), shop.between(0.8, 2.0)
     carcass = Carcass(width, 0, height, shop.between(0.25, 0.38), shop.between(0.02, 0.04), shop.chance(0.7))
-    columns = 1 if width < 0.7 else shop.pick(1, 2, 3)
+    columns = shop.pick(*range(1, 1 + max(1, min(3, int(width / 0.33)))))
     return _stand(
         shop, carcass, fronts.shelves(columns), shop.pick("none", "plinth", "feet", weights=(3, 2, 1))
     )
@@ -93,7 +92,11 @@ def wardrobe(shop: Workshop) -> list[Piece]:
 def rack(shop: Workshop) -> list[Piece]:
     """Shelves between four posts, open all around, sometimes on casters."""
     width, depth, height = shop.between(0.45, 1.2), shop.between(0.3, 0.45), shop.between(0.7, 1.9)
-    post, count, board = shop.between(0.022, 0.04), shop.pick(2, 3, 4, 5), shop.between(0.018, 0.035)
+    post, count, board = (
+        shop.between(0.022, 0.04),
+        shop.pick(*range(2 + (height > 1.1), 6)),
+        shop.between(0.018, 0.035),
+    )
     x, z = width / 2, depth / 2
     floor = 0.07 if shop.chance(0.25) else 0.0
     front = shop.block("frame_vertical_bar", (x - post, x), (floor, height), (z - post, z))
@@ -115,8 +118,8 @@ def rack(shop: Workshop) -> list[Piece]:
 def hutch(shop: Workshop) -> list[Piece]:
     """A cupboard below, and a shallower case with shelves or doors on it."""
     width, waist, board = shop.between(0.8, 1.3), shop.between(0.7, 0.9), shop.between(0.022, 0.035)
-    lower = Carcass(width, 0, waist, shop.between(0.4, 0.5), board)
-    fill = shop.pick(fronts.doors, fronts.doors_below_drawers, fronts.drawers("dresser"))
+    lower = Carcass(width, 0, waist, shop.between(0.4, 0.5), board, backed=False)
+    fill = shop.pick(fronts.doors, fronts.doors_below_drawers, fronts.drawers("chest"))
     pieces = _stand(shop, lower, fill, shop.pick("none", "plinth", "feet"), crown=False)
     deep, top = lower.depth * shop.between(0.55, 0.75), shop.between(1.6, 2.0)
     z = (-lower.depth / 2, deep - lower.depth / 2)

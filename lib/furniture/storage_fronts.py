@@ -3,8 +3,8 @@
 A filling takes the workshop and a carcass and returns two lists: pieces of the frame, and pieces beside the frame.
 """
 
+from .desks import drawer
 from .kit import Piece, Workshop, group
-from .table_bases import drawer
 
 GAP = 0.003  # around a front, metres
 Filling = tuple[list[Piece], list[Piece]]
@@ -53,7 +53,7 @@ def shelves(columns: int):
             if columns == 3:
                 stacks.append([shop.copy(piece, (pitch, 0, 0)) for piece in stacks[0]])
             return dividers, [piece for stack in stacks for piece in stack]
-        count = int(shop.between(1, most + 0.99))
+        count = int(shop.between(max(1, (y[1] - y[0]) / 0.5), most + 0.99))
         boards = _shelf_stack(
             shop, carcass, (slots[0][0], slots[-1][1]) if columns == 1 else slots[0], y, count
         )
@@ -99,8 +99,7 @@ def doors(shop: Workshop, carcass) -> Filling:
     inner, _, (back, front) = carcass.inside
     carcass_y = carcass.inside[1]
     dividers, slots = _columns(shop, carcass, 2 if count == 4 or shop.chance(0.15) else 1, carcass_y)
-    for piece in dividers:
-        piece.size, piece.center = piece.size - (0, 0, 0.024), piece.center - (0, 0, 0.012)
+    dividers = [_behind_doors(piece) for piece in dividers]
     if not dividers and shop.chance(0.5):
         stack = _shelf_stack(shop, carcass, inner, carcass_y, shop.pick(1, 2))
         pieces += [_behind_doors(piece) for piece in stack]
@@ -108,6 +107,7 @@ def doors(shop: Workshop, carcass) -> Filling:
 
 
 def _behind_doors(piece: Piece) -> Piece:
+    """Cut a little off the front of a piece, which would poke through a door inside the carcass."""
     piece.size, piece.center = piece.size - (0, 0, 0.024), piece.center - (0, 0, 0.012)
     return piece
 

@@ -5,6 +5,7 @@ table > regular_table > [tabletop, table_base]; both are groups of PartNet's. De
 
 from dataclasses import dataclass
 
+from . import desks
 from . import table_bases as bases
 from .kit import Piece, Workshop, group
 
@@ -36,6 +37,8 @@ def table(workshop: Workshop) -> Piece:
     kind = workshop.pick(dining, coffee, side, console, desk, weights=(28, 22, 18, 10, 24))
     frame, top, base = kind(workshop)
     frame.central = base in bases.CENTRAL
+    if frame.central and base is not bases.two_pedestals:
+        frame.width = min(frame.width, 1.3 * frame.depth)
     pieces = [group("tabletop", *top(workshop, frame)), group("table_base", *base(workshop, frame))]
     if workshop.chance(0.8):
         return group("table", group("regular_table", *pieces))
@@ -102,7 +105,7 @@ def side(shop: Workshop):
             bases.shelf_legs,
             bases.pedestal,
             bases.tripod,
-            bases.drawer_box,
+            desks.drawer_box,
             bases.c_frame,
             bases.panels,
         ),
@@ -122,7 +125,7 @@ def console(shop: Workshop):
         shop.between(0, 0.05),
     )
     base = shop.pick(
-        bases.legs, bases.shelf_legs, bases.drawer_box, bases.panels, bases.frames, bases.trestle
+        bases.legs, bases.shelf_legs, desks.drawer_box, bases.panels, bases.frames, bases.trestle
     )
     return frame, shop.pick(slab, slab, framed, planks, slab_on_apron), base
 
@@ -139,12 +142,12 @@ def desk(shop: Workshop):
     )
     base = shop.pick(
         *(
-            bases.drawer_towers,
-            bases.one_tower,
-            bases.drawer_box,
+            desks.drawer_towers,
+            desks.one_tower,
+            desks.drawer_box,
             bases.panels,
             bases.frames,
-            bases.keyboard_desk,
+            desks.keyboard_desk,
         ),
         weights=(4, 4, 3, 2, 2, 1.5),
     )

@@ -13,10 +13,9 @@ The files are the same, byte by byte, whatever the number of workers and however
 import argparse
 import hashlib
 import json
-import math
+import os
 import sys
 import time
-import warnings
 import zipfile
 import zlib
 from collections import Counter
@@ -24,18 +23,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-import torch
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
+from data_scripts.extraction_worker import extract_chunk
 from data_scripts.journal import Journal, write_whole
 from lib.datasets import CATEGORIES, REPOSITORY, DataError
-from lib.extractor import Extraction, Options, PartGraph, PartGraphError, extract_many
-from lib.extractor.errors import PartGraphWarning
-from lib.extractor.files import load, sources
+from lib.extractor import PartGraphError
+from lib.extractor.files import sources
 
 CHUNK = 32  # files a worker takes at once; fixed, because a batch of shapes is executed together
-LONGEST_NAME = 250  # bytes of a file or folder name
 CODE = ("extractor", "interpreters", "metrics")  # parts of lib whose change makes other programs
 FOLDERS = {f"{name}{end}": name for name in CATEGORIES for end in ("", "_hier")} | {
     "storagefurniture": "storage",
@@ -96,65 +93,6 @@ def category_of(source: Path, name: str) -> str:
     )
 
 
-def extract_chunk(source: Path, chunk: dict[str, str], keep_rejected: bool) -> list[dict]:
-    """One row for the journal for each file of the chunk, name -> fingerprint. Never raises for a bad file."""
-    torch.set_num_threads(1)  # the processes share the cores; and sums come in the same order everywhere
-    graphs, outcomes = {}, {}
-    for name, fingerprint in chunk.items():
-        try:
-            graphs[name] = _load(source, name, fingerprint.split()[0])
-        except Exception as error:  # whatever one file does, the others go on
-            outcomes[name] = _failure(error)
-    outcomes |= zip(graphs, _extract(list(graphs.values()), keep_rejected))
-    return [{"name": name, "source": chunk[name], **outcomes[name]} for name in chunk]
-
-
-def _load(source: Path, name: str, category: str) -> PartGraph:
-    parts = name.split("/")
-    if (
-        not all(parts)
-        or ".." in parts
-        or max(len(part.encode(errors="replace")) for part in parts) > LONGEST_NAME
-    ):
-        raise PartGraphError("its name cannot be the name of a program's file")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PartGraphWarning)  # thousands of files, each with odd labels
-        try:
-            return load(source, name, category)
-        except PartGraphError as error:
-            raise error.in_file(
-                ""
-            ) from None  # the row has the name already; the folder differs between machines
-
-
-def _extract(graphs: list[PartGraph], keep_rejected: bool) -> list[dict]:
-    """Outcomes of several graphs together or, should that fail, of each alone."""
-    try:
-        return [
-            _outcome(extraction) for extraction in extract_many(graphs, Options(keep_rejected=keep_rejected))
-        ]
-    except Exception as error:
-        if len(graphs) == 1:
-            return [_failure(error)]
-        return [outcome for graph in graphs for outcome in _extract([graph], keep_rejected)]
-
-
-def _outcome(extraction: Extraction) -> dict:
-    score = extraction.f_score
-    return {
-        "accepted": extraction.accepted,
-        "reason": extraction.reason,
-        "detail": extraction.detail,
-        "f_score": round(float(score), 2) if score is not None and math.isfinite(score) else None,
-        "program": extraction.program.to_text() if extraction.program else None,
-    }
-
-
-def _failure(error: Exception) -> dict:
-    what = str(error) if isinstance(error, PartGraphError) else f"{type(error).__name__}: {error}"
-    return {"accepted": False, "reason": "error", "detail": what, "f_score": None, "program": None}
-
-
 @contextmanager
 def workers(count: int, scheduler: str | None) -> Iterator[None]:
     """Where chunks are worked on: `count` processes (-1: one for each core), or a running Dask cluster.
@@ -193,9 +131,10 @@ def extract_all(options: argparse.Namespace) -> tuple[list[dict], int]:
     chunks = [chunk for chunk in chunks if not journal.rows.keys() >= chunk.keys()]
     count = sum(map(len, chunks))
     source = options.input.resolve()  # a worker may have another working folder
+    parent = None if options.scheduler else os.getpid()
     with tqdm(desc="extracting", unit=" shapes", total=len(found), initial=len(found) - count) as bar:
         with workers(options.workers, options.scheduler):
-            jobs = (delayed(extract_chunk)(source, chunk, options.keep_rejected) for chunk in chunks)
+            jobs = (delayed(extract_chunk)(source, chunk, options.keep_rejected, parent) for chunk in chunks)
             for rows in Parallel(return_as="generator_unordered", batch_size=1)(jobs):
                 journal.add(rows)
                 for row in rows:

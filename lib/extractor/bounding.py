@@ -14,7 +14,7 @@ from ..interpreters.cuboids import Cuboids
 from .partgraph import Part, PartGraph, stack
 from .snapping import rename_axes
 
-WORTH_TURNING = 0.85  # a turned box must have less than this share of the upright one's volume
+WORTH_TURNING = 0.95  # a turned box must have less than this share of the upright one's volume
 
 
 def refit(graph: PartGraph) -> PartGraph:

@@ -107,7 +107,8 @@ def survey(node: Part, category: str, options: Options = Options(), level: int =
         if len(joined) != len(facts.parts):
             facts = look([seen_from_same(part) for part in joined], size, category, options)
     if options.macros:
-        facts = replace(facts, groups=tuple(find_groups(list(facts.parts), facts.boxes, list(facts.contacts), size)))
+        groups = find_groups(list(facts.parts), facts.boxes, facts.aligned, list(facts.contacts), size)
+        facts = replace(facts, groups=tuple(groups))
     facts = replace(facts, ways=tuple(place(facts, options)))
     inner = {
         i: survey(facts.parts[i], category, options, level + 1) for i in facts.written if facts.parts[i].children

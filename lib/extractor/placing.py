@@ -70,8 +70,14 @@ def ways_to_place(
             ways.append(Way(cuboid, (p1, p2), squeeze_points(face, p1, p2, r1), (kind1, kind2), face))
         if turn is not None:
             partner = boxes[p2] if p2 >= 0 else bounding_box(size)
-            aimed = _aimed(boxes[cuboid], partner, q1, q2, turn)
-            ways.append(Way(cuboid, (p1, p2), ((q1, r1), aimed), (kind1, MIDDLE)))
+            ways.append(
+                Way(
+                    cuboid,
+                    (p1, p2),
+                    ((q1, r1), _aimed(boxes[cuboid], partner, q1, q2, turn)),
+                    (kind1, MIDDLE),
+                )
+            )
     return ways
 
 

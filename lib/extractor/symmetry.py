@@ -10,7 +10,8 @@ parts are compared with all that is in them, as the language would copy it.
 Condition (i) of the paper keeps copies from going where they hold something that would fall without them. We ask for
 exactly that, and so find more groups: members must touch at least one part in common, at corresponding places (the
 source is then held by such parts only, since its copies will be too), and without the copies everything else must
-still hang together. The first slat of a row may touch the seat, and the last one the head.
+still have its holds: one that leads to the bounding box, and a second one if it is tilted, for two points turn a
+cuboid. The first slat of a row may touch the seat, and the last one the head.
 """
 
 from dataclasses import dataclass, replace
@@ -41,7 +42,13 @@ class Group:
     holds: frozenset[int] = frozenset()  # parts that hold the source, as their images hold the copies
 
 
-def find_groups(parts: list[Part], boxes: Cuboids, contacts: list[Contact], size: Float[Tensor, "3"]) -> list[Group]:
+def find_groups(
+    parts: list[Part],
+    boxes: Cuboids,
+    aligned: Bool[Tensor, " n"],
+    contacts: list[Contact],
+    size: Float[Tensor, "3"],
+) -> list[Group]:
     """Groups of a block's parts; `boxes` are their boxes (n), straightened. No part is in two groups."""
     mirrored = [mirror_images(parts, boxes, axis, size) for axis in range(3)]
     rows = [row for axis in range(3) for row in find_rows(parts, boxes, axis, size)]
@@ -57,7 +64,7 @@ def find_groups(parts: list[Part], boxes: Cuboids, contacts: list[Contact], size
             continue
         holds = common_holds(group, touched, boxes, SAME_POINT * float(size.max()))
         more = [*groups, replace(group, holds=frozenset(holds))]
-        if holds and not falling(len(parts), contacts, more):
+        if holds and not falling(len(parts), contacts, more) and not turning(aligned.tolist(), contacts, more):
             groups = more
     return groups
 
@@ -67,6 +74,18 @@ def falling(count: int, contacts: list[Contact], groups: list[Group]) -> set[int
     copies = {member for group in groups for member in group.members[1:]}
     left = [contact for contact in contacts if copies.isdisjoint((contact.first, contact.second))]
     return floating(count, left, {group.members[0]: group.holds for group in groups}) - copies
+
+
+def turning(aligned: list[bool], contacts: list[Contact], groups: list[Group]) -> set[int]:
+    """The tilted parts that would be left with fewer than the two holds that turn them, though they have them."""
+    copies = {member for group in groups for member in group.members[1:]}
+    holds = {group.members[0]: group.holds for group in groups}
+    lost = set()
+    for part in (i for i, upright in enumerate(aligned) if not upright and i not in copies):
+        partners = {c.partner(part) for c in contacts if part in (c.first, c.second)}
+        if len((partners - copies) & holds.get(part, partners)) < min(2, len(partners)):
+            lost.add(part)
+    return lost
 
 
 def touched_parts(count: int, contacts: list[Contact]) -> list[dict[int, Tensor]]:

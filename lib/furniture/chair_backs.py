@@ -3,7 +3,7 @@
 from .kit import Piece, Workshop, group, tilt
 
 
-def leaning(shop: Workshop, frame, piece: Piece) -> Piece:
+def leaning(frame, piece: Piece) -> Piece:
     """A back, or what is mounted on it, tilted about the rear edge of the seat."""
     return tilt(piece, frame.lean, (frame.height, frame.rear)) if frame.lean else piece
 
@@ -194,23 +194,16 @@ def panel_on_stem(shop: Workshop, frame) -> list[Piece]:
     return [group("back_surface", board), *stems]
 
 
-PADDED = (slab, panel_on_posts, panel_on_stem, winged)  # they may carry a headrest
+PADDED = (slab, panel_on_stem, winged)  # they may carry a headrest
 WOODEN = (ladder, spindles, spindles, splat, cross, framed, rail)
 
 
-def head(shop: Workshop, frame) -> list[Piece]:
-    """A pad above the back, on it or on two short bars."""
-    gap, half, high = (
-        shop.pick(0.0, shop.between(0.03, 0.06)),
-        frame.width * shop.between(0.24, 0.34),
-        shop.between(0.09, 0.15),
-    )
-    bottom = frame.height + frame.back + gap
-    z = frame.rear + 0.01
-    pad = shop.block("headrest", (-half, half), (bottom, bottom + high), (z - 0.025, z + 0.035))
+def head(shop: Workshop, frame, middle: float) -> list[Piece]:
+    """A pad above a back whose middle plane is at z = `middle`, on it or on two short bars."""
+    gap, high = shop.pick(0.0, shop.between(0.03, 0.06)), shop.between(0.09, 0.15)
+    half, bottom = frame.width * shop.between(0.24, 0.34), frame.height + frame.back + gap
+    pad = shop.block("headrest", (-half, half), (bottom, bottom + high), (middle - 0.025, middle + 0.035))
     if not gap:
         return [pad]
-    bar = shop.block(
-        "head_connector", (half * 0.5, half * 0.5 + 0.018), (bottom - gap, bottom), (z - 0.009, z + 0.009)
-    )
-    return [pad, *shop.both(bar)]
+    sides, y, z = (half * 0.5, half * 0.5 + 0.018), (bottom - gap, bottom), (middle - 0.009, middle + 0.009)
+    return [pad, *shop.both(shop.block("head_connector", sides, y, z))]

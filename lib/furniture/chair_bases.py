@@ -38,10 +38,9 @@ def legs(shop: Workshop, frame) -> list[Piece]:
     return pieces + stretchers(shop, style, front, back)
 
 
-def stretchers(
-    shop: Workshop, style: str, front: Leg, back: Leg, label: str = "bar_stretcher"
-) -> list[Piece]:
+def stretchers(shop: Workshop, style: str, front: Leg, back: Leg) -> list[Piece]:
     """Bars between four legs; `style` is "none", "sides", "H", "box", "front and back" or "X"."""
+    label = "bar_stretcher"
     low, high, thin = shop.between(0.2, 0.4), shop.between(0.45, 0.65), min(front.thick, back.thick) * 0.6
     share = low if style in ("X", "H") else high
     pieces = []
@@ -49,13 +48,9 @@ def stretchers(
         pieces += shop.both(shop.beam(label, back.at(share), front.at(share), (thin, thin), along=2))
     if style == "H":
         x, y, z = (back.at(share) + front.at(share)) / 2
-        pieces.append(shop.block(label, (-x, x), (y - thin / 2, y + thin / 2), (z - thin / 2, z + thin / 2)))
+        pieces.append(shop.crossbar(label, x, y, z, thin))
     if style in ("box", "front and back"):
-        for leg in (front, back):
-            x, y, z = leg.at(low)
-            pieces.append(
-                shop.block(label, (-x, x), (y - thin / 2, y + thin / 2), (z - thin / 2, z + thin / 2))
-            )
+        pieces += [shop.crossbar(label, *leg.at(low), thin) for leg in (front, back)]
     if style == "X":
         end, start = front.at(share), back.at(share) * (-1, 1, 1)
         along = 0 if end[0] - start[0] > end[2] - start[2] else 2
@@ -67,15 +62,13 @@ def runners(shop: Workshop, frame) -> list[Piece]:
     """Sled: on each side two legs on a runner along the floor."""
     splay, thick = shop.pick(0.0, shop.between(0.02, 0.06)), shop.between(0.02, 0.04)
     x, z = frame.width / 2 - thick / 2, frame.depth / 2 - thick
-    front, back = Leg((x, thick / 2, z + splay), (x, frame.under, z), thick), None
+    front = Leg((x, thick / 2, z + splay), (x, frame.under, z), thick)
     back = Leg((x, thick / 2, -z - splay), (x, frame.under, -z), thick)
     reach = z + splay + thick / 2
     runner = shop.block("runner", (x - thick / 2, x + thick / 2), (0, thick), (-reach, reach))
     pieces = shop.both(front.build(shop), back.build(shop), runner)
-    if shop.chance(0.5):
-        pieces.append(shop.block("bar_stretcher", (-x, x), (0, thick), (-reach, -reach + thick)))
-        pieces += shop.row(pieces[-1], (0, 0, 2 * reach - thick), 2)[1:] if shop.chance(0.5) else []
-    return pieces
+    bar = shop.crossbar("bar_stretcher", x - thick / 2, thick / 2, thick / 2 - reach, thick)
+    return pieces + shop.row(bar, (0, 0, 2 * reach - thick), shop.pick(0, 0, 1, 2))
 
 
 def cantilever(shop: Workshop, frame) -> list[Piece]:
@@ -84,13 +77,10 @@ def cantilever(shop: Workshop, frame) -> list[Piece]:
     x, z = frame.width / 2 - thick / 2, frame.depth / 2 - thick
     lean = shop.pick(0.0, shop.between(0.02, 0.08))
     leg = Leg((x, thick / 2, z + lean), (x, frame.under, z), thick)
-    runner = shop.block(
-        "runner", (x - thick / 2, x + thick / 2), (0, thick), (-z - thick, z + lean + thick / 2)
-    )
-    bar = shop.block("bar_stretcher", (thick / 2 - x, x - thick / 2), (0, thick), (-z - thick, -z))
-    rail = shop.block(
-        "seat_support", (x - thick / 2, x + thick / 2), (frame.under - thick, frame.under), (-z, z)
-    )
+    sides = (x - thick / 2, x + thick / 2)
+    runner = shop.block("runner", sides, (0, thick), (-z - thick, z + lean + thick / 2))
+    bar = shop.crossbar("bar_stretcher", x - thick / 2, thick / 2, -z - thick / 2, thick)
+    rail = shop.block("seat_support", sides, (frame.under - thick, frame.under), (-z, z - thick / 2))
     rails = shop.both(rail) if shop.chance(0.5) else []
     return shop.both(leg.build(shop), runner) + [bar] + rails
 
@@ -101,10 +91,7 @@ def crossed(shop: Workshop, frame) -> list[Piece]:
     x, top = frame.width / 2 - thick / 2, frame.under
     outer = shop.beam("leg", (x, 0, -reach), (x, top, reach), (thick, thick))
     inner = shop.beam("leg", (x - thick, 0, reach), (x - thick, top, -reach), (thick, thick))
-    y, z, half = top * 0.15, reach * 0.7, x - thick / 2
-    bar = shop.block(
-        "bar_stretcher", (-half, half), (y - thick / 2, y + thick / 2), (z - thick / 2, z + thick / 2)
-    )
+    bar = shop.crossbar("bar_stretcher", x - 1.5 * thick, 0.15 * top, 0.7 * reach, thick)
     return shop.both(outer, inner) + ([bar] if shop.chance(0.7) else [])
 
 
@@ -114,9 +101,8 @@ def panels(shop: Workshop, frame) -> list[Piece]:
     pieces = shop.both(shop.block("leg", (half - thick, half), (0, frame.under), (frame.rear, -frame.rear)))
     if shop.chance(0.5):
         high = (frame.under * shop.between(0.3, 0.7), frame.under)
-        pieces.append(
-            shop.block("bar_stretcher", (thick - half, half - thick), high, (frame.rear, frame.rear + 0.025))
-        )
+        z = (frame.rear, frame.rear + 0.025)
+        pieces.append(shop.block("bar_stretcher", (thick - half, half - thick), high, z))
     return pieces
 
 
@@ -131,10 +117,7 @@ def h_legs(shop: Workshop, frame) -> list[Piece]:
     if shop.chance(0.4):
         side.append(shop.beam("bar_stretcher", back.at(0.95), front.at(0.95), (thin, thin), along=2))
     sides = shop.both(group("leg", *side))
-    x, height, z = (front.at(y) + back.at(y)) / 2
-    middle = shop.block(
-        "bar_stretcher", (-x, x), (height - thin / 2, height + thin / 2), (z - thin / 2, z + thin / 2)
-    )
+    middle = shop.crossbar("bar_stretcher", *(front.at(y) + back.at(y)) / 2, thin)
     return sides + ([middle] if shop.chance(0.6) else [])
 
 
@@ -150,7 +133,7 @@ def pedestal(shop: Workshop, frame) -> list[Piece]:
 
 
 def _footrest(shop: Workshop, frame, column: float) -> list[Piece]:
-    """A ring around the column of a bar stool, as a flat box: a bar to the front and one across it."""
+    """For the feet on a tall column: a bar to the front and one across it."""
     if frame.under < 0.5 or shop.chance(0.3):
         return []
     y, reach, thin = frame.under * shop.between(0.35, 0.5), frame.depth * shop.between(0.35, 0.45), 0.012
@@ -169,35 +152,39 @@ def star(shop: Workshop, frame) -> list[Piece]:
         lever = shop.block("lever", (0.09, 0.2), (top + 0.01, top + 0.03), (0, 0.02))
         pieces.append(group("mechanical_control", plate, lever))
     pieces.append(shop.block("central_support", (-column, column), (0.06 * casters, top), (-column, column)))
-    turn = np.pi / 4 if count == 4 and shop.chance(0.6) else 0.0
     radius, thick = max(frame.width, 0.42) * shop.between(0.48, 0.6), shop.between(0.025, 0.045)
-    rise = shop.pick(0.0, shop.between(0.02, 0.06))
-    for angle in turn + np.arange(count) * 2 * np.pi / count:
-        direction = np.array([np.sin(angle), 0.0, -np.cos(angle)])
-        if direction[0] > -1e-9:  # the others are mirror images
-            spoke = _spoke(shop, direction, (0.8 * column, radius), 0.06 * casters + thick / 2, rise, thick)
-            if casters:
-                spoke.append(_caster(shop, direction * (radius - 0.02)))
-            pieces += shop.both(*spoke) if direction[0] > 1e-9 else spoke
+    height, rise = 0.06 * casters + thick / 2, shop.pick(0.0, shop.between(0.02, 0.06))
+    for direction in directions(shop, count):
+        arm = [spoke(shop, "leg", direction, (0.8 * column, radius), (height + rise, height), thick)]
+        if casters:
+            arm.append(_caster(shop, direction * (radius - 0.02)))
+        pieces += shop.both(*arm) if direction[0] > 1e-9 else arm
     return pieces + _footrest(shop, frame, column)
 
 
-def _spoke(
-    shop: Workshop, direction: np.ndarray, reach: tuple, height: float, rise: float, thick: float
-) -> list[Piece]:
-    """A leg of a star, between two distances from the middle; it is `rise` higher at the inner one."""
-    hub, tip = direction * reach[0] + (0, height + rise, 0), direction * reach[1] + (0, height, 0)
+def directions(shop: Workshop, count: int) -> list[np.ndarray]:
+    """Of `count` evenly spread horizontal directions, those that point to the right or along the middle plane."""
+    turn = np.pi / 4 if count == 4 and shop.chance(0.6) else 0.0
+    angles = turn + np.arange(count) * 2 * np.pi / count
+    spread = np.stack([np.sin(angles), np.zeros(count), -np.cos(angles)], axis=1)
+    return [direction for direction in spread if direction[0] > -1e-9]
+
+
+def spoke(
+    shop: Workshop, label: str, direction: np.ndarray, reach: tuple, heights: tuple, thick: float
+) -> Piece:
+    """A bar that points away from the middle; `reach` and `heights` are those of its inner and its outer end."""
+    hub, tip = (direction * out + (0, y, 0) for out, y in zip(reach, heights))
     along = 0 if abs(direction[0]) > abs(direction[2]) + 1e-9 else 2
     start, end = (hub, tip) if direction[along] > 0 else (tip, hub)
-    return [shop.beam("leg", start, end, (thick, thick), along)]
+    return shop.beam(label, start, end, (thick, thick), along)
 
 
 def _caster(shop: Workshop, place: np.ndarray) -> Piece:
     x, _, z = place
     stem = shop.block("caster_stem", (x - 0.008, x + 0.008), (0.04, 0.065), (z - 0.008, z + 0.008))
-    return group(
-        "caster", stem, shop.block("wheel", (x - 0.016, x + 0.016), (0, 0.042), (z - 0.022, z + 0.022))
-    )
+    wheel = shop.block("wheel", (x - 0.016, x + 0.016), (0, 0.042), (z - 0.022, z + 0.022))
+    return group("caster", stem, wheel)
 
 
 def tripod(shop: Workshop, frame) -> list[Piece]:
@@ -208,10 +195,7 @@ def tripod(shop: Workshop, frame) -> list[Piece]:
     front = Leg((x + splay * 0.87, 0, z + splay * 0.5), (x, frame.under, z), thick)
     pieces = [back.build(shop), *shop.both(front.build(shop))]
     if shop.chance(0.5):
-        (x, y, z), thin = front.at(shop.between(0.3, 0.5)), thick * 0.6
-        pieces.append(
-            shop.block("bar_stretcher", (-x, x), (y - thin / 2, y + thin / 2), (z - thin / 2, z + thin / 2))
-        )
+        pieces.append(shop.crossbar("bar_stretcher", *front.at(shop.between(0.3, 0.5)), 0.6 * thick))
     return pieces
 
 
@@ -227,23 +211,22 @@ def rockers(shop: Workshop, frame) -> list[Piece]:
 
 
 def feet(shop: Workshop, frame) -> list[Piece]:
-    """Short feet, straight or splayed, with or without a rail between them."""
+    """Short feet, straight or splayed; a long sofa stands on its middle, too."""
     thick, inset, splay = (
         shop.between(0.03, 0.07),
-        shop.between(0.0, 0.05),
-        shop.pick(0.0, shop.between(0.01, 0.04)),
+        shop.between(0, 0.05),
+        shop.pick(0, shop.between(0.01, 0.04)),
     )
     x, z = frame.width / 2 - inset - thick / 2, frame.depth / 2 - inset - thick / 2
     label = shop.pick("foot", "leg")
     front = Leg((x + splay, 0, z + splay), (x, frame.under, z), thick)
     back = Leg((x + splay, 0, -z - splay), (x, frame.under, -z), thick)
     pieces = shop.both(front.build(shop, label), back.build(shop, label))
-    if frame.width > 1.6:  # a long sofa stands on its middle, too
-        pieces += shop.row(
-            shop.beam(label, (0, 0, z + splay), (0, frame.under, z), (thick, thick)),
-            (0, 0, -2 * z - splay),
-            2,
-        )
+    if frame.width > 1.6:
+        for side in (1, -1):
+            pieces.append(
+                Leg((0, 0, side * (z + splay)), (0, frame.under, side * z), thick).build(shop, label)
+            )
     return pieces
 
 

@@ -37,7 +37,7 @@ class Frame:
 
 def chair(workshop: Workshop) -> Piece:
     """One chair of a family drawn at random."""
-    family = workshop.pick(dining, office, sofa, stool, lounge, weights=(44, 14, 14, 12, 16))
+    family = workshop.pick(dining, office, sofa, stool, lounge, weights=(44, 15, 14, 10, 17))
     pieces = family(workshop)
     return group("chair", *[piece for piece in pieces if piece.children])
 
@@ -94,11 +94,13 @@ def stool(shop: Workshop) -> list[Piece]:
     """A bar stool or a low one, seldom with a low back."""
     side, tall = shop.between(0.3, 0.4), shop.chance(0.75)
     height = shop.between(0.60, 0.78) if tall else shop.between(0.38, 0.5)
-    frame = Frame(side, side * shop.between(0.9, 1.0), height, shop.between(0.03, 0.1))
+    frame = Frame(side, side * shop.between(0.9, 1.0), height, shop.between(0.05, 0.1))
     back = shop.pick(None, backs.slab, backs.rail, backs.panel_on_posts, weights=(3, 1, 1, 1))
     if back:
         frame.back, frame.lean = shop.between(0.16, 0.32), shop.between(0, 0.15)
-    base = shop.pick(bases.legs, bases.tripod, bases.pedestal, bases.star, bases.crossed, bases.runners)
+    base = shop.pick(
+        bases.legs, bases.tripod, bases.star, bases.pedestal, bases.runners, weights=(4, 2, 3, tall, 1)
+    )
     return _assemble(shop, frame, shop.pick(*seats.FIRM), base, back, None, headrest=0)
 
 
@@ -116,12 +118,14 @@ def lounge(shop: Workshop) -> list[Piece]:
 
 
 def _assemble(shop: Workshop, frame: Frame, seat, base, back, arms, headrest: float) -> list[Piece]:
-    """Each choice made into its group; None is left out."""
-    pieces = [group("chair_base", *base(shop, frame)), group("chair_seat", *seat(shop, frame))]
+    """Each choice made into its group; None is left out. A seat and a back may correct the frame, so they go first."""
+    pieces = [group("chair_seat", *seat(shop, frame))]
     if back:
-        pieces.append(backs.leaning(shop, frame, group("chair_back", *back(shop, frame))))
+        parts = back(shop, frame)
         if back in backs.PADDED and shop.chance(headrest):
-            pieces.append(backs.leaning(shop, frame, group("chair_head", *backs.head(shop, frame))))
+            middle = parts[0].children[0].center[2]  # of the padded surface
+            pieces.append(backs.leaning(frame, group("chair_head", *backs.head(shop, frame, middle))))
+        pieces.append(backs.leaning(frame, group("chair_back", *parts)))
     if arms:
         pieces += arms(shop, frame)
-    return pieces
+    return [group("chair_base", *base(shop, frame)), *pieces]

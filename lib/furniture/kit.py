@@ -82,6 +82,11 @@ class Workshop:
         low, high = np.sort(np.array([x, y, z], dtype=float), axis=1).T
         return self._cut(Piece(label, center=(low + high) / 2, size=high - low))
 
+    def crossbar(self, label: str, reach: float, y: float, z: float, thick: float) -> Piece:
+        """A square bar from x = -reach to x = reach whose middle line is at (y, z)."""
+        half = thick / 2
+        return self.block(label, (-reach, reach), (y - half, y + half), (z - half, z + half))
+
     def beam(self, label: str, start, end, thickness: tuple[float, float], along: int = 1) -> Piece:
         """A box whose axis number `along` runs from one point to another.
 
@@ -105,7 +110,7 @@ class Workshop:
 
     def row(self, piece: Piece, step: tuple[float, float, float], count: int) -> list[Piece]:
         """The piece and copies of it, each one `step` (metres) further."""
-        return [piece] + [self.copy(piece, np.multiply(step, k)) for k in range(1, count)]
+        return [self.copy(piece, np.multiply(step, k)) if k else piece for k in range(count)]
 
     def copy(self, piece: Piece, move=(0.0, 0.0, 0.0), mirrored: bool = False) -> Piece:
         """A copy, moved, or mirrored at the plane x = 0."""

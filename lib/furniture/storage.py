@@ -92,11 +92,7 @@ def wardrobe(shop: Workshop) -> list[Piece]:
 def rack(shop: Workshop) -> list[Piece]:
     """Shelves between four posts, open all around, sometimes on casters."""
     width, depth, height = shop.between(0.45, 1.2), shop.between(0.3, 0.45), shop.between(0.7, 1.9)
-    post, count, board = (
-        shop.between(0.022, 0.04),
-        shop.pick(*range(2 + (height > 1.1), 6)),
-        shop.between(0.018, 0.035),
-    )
+    post, count, board = shop.between(0.022, 0.04), shop.pick(3, 4, 5), shop.between(0.018, 0.035)
     x, z = width / 2, depth / 2
     floor = 0.07 if shop.chance(0.25) else 0.0
     front = shop.block("frame_vertical_bar", (x - post, x), (floor, height), (z - post, z))
@@ -121,6 +117,7 @@ def hutch(shop: Workshop) -> list[Piece]:
     lower = Carcass(width, 0, waist, shop.between(0.4, 0.5), board, backed=False)
     fill = shop.pick(fronts.doors, fronts.doors_below_drawers, fronts.drawers("chest"))
     pieces = _stand(shop, lower, fill, shop.pick("none", "plinth", "feet"), crown=False)
+    waist = lower.top  # the base has lifted it
     deep, top = lower.depth * shop.between(0.55, 0.75), shop.between(1.6, 2.0)
     z = (-lower.depth / 2, deep - lower.depth / 2)
     x = width / 2
@@ -157,16 +154,15 @@ def ladder(shop: Workshop) -> list[Piece]:
     return [group("cabinet_frame", *shop.both(leaning, upright)), *shelves]
 
 
+LIFTS = {  # heights of bases, metres
+    **{"none": (0, 0), "plinth": (0.05, 0.1), "feet": (0.05, 0.12)},
+    **{"legs": (0.14, 0.3), "frame": (0.12, 0.3), "casters": (0.068, 0.07)},
+}
+
+
 def _stand(shop: Workshop, carcass: Carcass, fill, base: str, crown: bool = True) -> list[Piece]:
     """Frame, contents and base of a cabinet. `base` is one of "none", "plinth", "feet", "legs", "frame", "casters"."""
-    heights = {
-        "plinth": (0.05, 0.1),
-        "feet": (0.05, 0.12),
-        "legs": (0.14, 0.3),
-        "frame": (0.12, 0.3),
-        "casters": (0.068, 0.07),
-    }
-    lift = shop.between(*heights[base]) if base != "none" else 0.0
+    lift = shop.between(*LIFTS[base])
     carcass.bottom, carcass.top = lift, carcass.top + lift
     panels = _panels(shop, carcass)
     inner, pieces = fill(shop, carcass)
@@ -193,11 +189,10 @@ def _panels(shop: Workshop, carcass: Carcass) -> list[Piece]:
 
 
 def _countertop(shop: Workshop, carcass: Carcass) -> Piece:
+    """A board on top, which the carcass is then higher by."""
     over, x, z = shop.between(0.0, 0.03), carcass.width / 2, carcass.depth / 2
-    thick = shop.between(0.02, 0.04)
-    return shop.block(
-        "countertop", (-x - over, x + over), (carcass.top, carcass.top + thick), (-z, z + over + 0.01)
-    )
+    low, carcass.top = carcass.top, carcass.top + shop.between(0.02, 0.04)
+    return shop.block("countertop", (-x - over, x + over), (low, carcass.top), (-z, z + over + 0.01))
 
 
 def _mirror(shop: Workshop, carcass: Carcass) -> Piece:

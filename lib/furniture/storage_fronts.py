@@ -18,9 +18,8 @@ def _columns(shop: Workshop, carcass, count: int, y: tuple) -> tuple[list[Piece]
     if count == 1:
         return [], [(left, right)]
     first = shop.block("vertical_divider_panel", (edges[1] - half, edges[1] + half), y, (back, front - 0.004))
-    slots = [
-        (a + half * (k > 0), b - half * (k < count - 1)) for k, (a, b) in enumerate(zip(edges, edges[1:]))
-    ]
+    lows = [edge + half for edge in edges[1:-1]]
+    slots = list(zip([left, *lows], [*(low - 2 * half for low in lows), right]))
     return shop.row(first, (pitch, 0, 0), count - 1), slots
 
 
@@ -30,11 +29,7 @@ def _shelf_stack(shop: Workshop, carcass, x: tuple, y: tuple, count: int) -> lis
     board = carcass.board * 0.9
     pitch = (y[1] - y[0] + board) / (count + 1)
     at = y[0] + pitch - board
-    return (
-        shop.row(shop.block("shelf", x, (at, at + board), (back, front - 0.005)), (0, pitch, 0), count)
-        if count
-        else []
-    )
+    return shop.row(shop.block("shelf", x, (at, at + board), (back, front - 0.005)), (0, pitch, 0), count)
 
 
 def shelves(columns: int):
@@ -46,17 +41,13 @@ def shelves(columns: int):
         pitch = slots[-1][0] - slots[0][0] if columns > 1 else 0
         most = min(6, int((y[1] - y[0]) / 0.2))
         if columns > 1 and shop.chance(0.3):  # every column has shelves of its own
-            stacks = [
-                _shelf_stack(shop, carcass, x, y, int(shop.between(1, min(4, most) + 0.99)))
-                for x in slots[:2]
-            ]
+            counts = [int(shop.between(1, min(4, most) + 0.99)) for _ in range(2)]
+            stacks = [_shelf_stack(shop, carcass, x, y, count) for x, count in zip(slots, counts)]
             if columns == 3:
                 stacks.append([shop.copy(piece, (pitch, 0, 0)) for piece in stacks[0]])
             return dividers, [piece for stack in stacks for piece in stack]
         count = int(shop.between(max(1, (y[1] - y[0]) / 0.5), most + 0.99))
-        boards = _shelf_stack(
-            shop, carcass, (slots[0][0], slots[-1][1]) if columns == 1 else slots[0], y, count
-        )
+        boards = _shelf_stack(shop, carcass, slots[0], y, count)
         step = (slots[1][0] - slots[0][0], 0, 0) if columns > 1 else (0, 0, 0)
         return dividers, [each for board in boards for each in shop.row(board, step, columns)]
 
@@ -92,16 +83,13 @@ def _door_count(shop: Workshop, carcass) -> int:
 
 def doors(shop: Workshop, carcass) -> Filling:
     """Doors over the whole front, with shelves behind them."""
-    inset = shop.chance(0.5)
-    x, y = _front_range(carcass, inset)
-    count = _door_count(shop, carcass)
-    pieces = _doors(shop, carcass, x, y, count, inset)
-    inner, _, (back, front) = carcass.inside
-    carcass_y = carcass.inside[1]
-    dividers, slots = _columns(shop, carcass, 2 if count == 4 or shop.chance(0.15) else 1, carcass_y)
+    inset, count = shop.chance(0.5), _door_count(shop, carcass)
+    pieces = _doors(shop, carcass, *_front_range(carcass, inset), count, inset)
+    inner_x, inner_y, _ = carcass.inside
+    dividers, _ = _columns(shop, carcass, 2 if count == 4 or shop.chance(0.15) else 1, inner_y)
     dividers = [_behind_doors(piece) for piece in dividers]
     if not dividers and shop.chance(0.5):
-        stack = _shelf_stack(shop, carcass, inner, carcass_y, shop.pick(1, 2))
+        stack = _shelf_stack(shop, carcass, inner_x, inner_y, shop.pick(1, 2))
         pieces += [_behind_doors(piece) for piece in stack]
     return dividers, pieces
 
@@ -119,14 +107,8 @@ def _drawer_grid(
     _, _, (back, front) = carcass.inside
     pitch_x, pitch_y = (x[1] - x[0]) / columns, (y[1] - y[0]) / rows
     front += 0.0 if inset else 0.02
-    slot = (x[0] + GAP, x[0] + pitch_x - GAP)
-    first = drawer(
-        shop,
-        "drawer",
-        slot,
-        (y[0] + GAP, y[0] + pitch_y - GAP),
-        (front - 0.02 if not inset else back + 0.01, front),
-    )
+    slot_x, slot_y = (x[0] + GAP, x[0] + pitch_x - GAP), (y[0] + GAP, y[0] + pitch_y - GAP)
+    first = drawer(shop, "drawer", slot_x, slot_y, (back + 0.01 if inset else front - 0.02, front))
     row = shop.row(first, (pitch_x, 0, 0), columns)
     return [each for piece in row for each in shop.row(piece, (0, pitch_y, 0), rows)]
 
@@ -153,8 +135,7 @@ def _two_storeys(shop: Workshop, carcass, share: float) -> tuple[list[Piece], tu
     """A board between a lower and an upper part (`share` of the height is below): the board, and both y ranges."""
     x, (low, high), (back, front) = carcass.inside
     middle, half = low + share * (high - low), carcass.board / 2
-    board = shop.block("frame_horizontal_bar", x, (middle - half, middle + half), (back, front))
-    board.label = "shelf"
+    board = shop.block("shelf", x, (middle - half, middle + half), (back, front))
     return [board], (low, middle - half), (middle + half, high)
 
 
@@ -195,20 +176,15 @@ def mixed_columns(shop: Workshop, carcass) -> Filling:
     count = shop.pick(2, 3, 3, 4)
     y = carcass.inside[1]
     dividers, slots = _columns(shop, carcass, count, y)
-    kinds = shop.pick(
-        ("door", "drawers"),
-        ("drawers", "door"),
-        ("door", "open"),
-        ("drawers", "open"),
-        ("open", "door"),
-        ("door", "door"),
-    )
-    pieces = _column(shop, carcass, kinds[0], slots[0], y)
+    outer, inner = shop.pick("door", "drawers", "open"), shop.pick("door", "drawers", "open")
+    if inner == outer:  # nothing but shelves, or nothing but drawers, is another kind of furniture
+        inner, outer = "door", shop.pick("door", "drawers")
+    pieces = _column(shop, carcass, outer, slots[0], y)
     pieces += [shop.copy(piece, mirrored=True) for piece in pieces]
     if count == 3:
-        pieces += _column(shop, carcass, kinds[1], slots[1], y)
+        pieces += _column(shop, carcass, inner, slots[1], y)
     elif count == 4:
-        pieces += shop.both(*_column(shop, carcass, kinds[1], slots[1], y))
+        pieces += shop.both(*_column(shop, carcass, inner, slots[1], y))
     return dividers, pieces
 
 
@@ -244,7 +220,7 @@ def feet(shop: Workshop, carcass, lift: float) -> list[Piece]:
 
 
 def legs(shop: Workshop, carcass, lift: float) -> list[Piece]:
-    """Four slender legs, straight or splayed; a long one has a fifth."""
+    """Four slender legs, straight or splayed."""
     thick, splay = shop.between(0.025, 0.04), shop.pick(0.0, shop.between(0.02, 0.06))
     inset = thick / 2 + splay + shop.between(0.0, 0.04)
     x, z = carcass.width / 2 - inset, carcass.depth / 2 - inset
@@ -259,11 +235,8 @@ def frame(shop: Workshop, carcass, lift: float) -> list[Piece]:
     low = (0, bar) if shop.chance(0.4) else (lift - bar, lift)
     side = shop.block("frame_horizontal_bar", (x - bar, x), low, (bar - z, z - bar))
     pieces = shop.both(front, shop.copy(front, (0, 0, bar - 2 * z)), side)
-    return pieces + (
-        [shop.block("frame_horizontal_bar", (bar - x, x - bar), low, (z - bar, z))]
-        if shop.chance(0.4)
-        else []
-    )
+    across = shop.block("frame_horizontal_bar", (bar - x, x - bar), low, (z - bar, z))
+    return pieces + ([across] if shop.chance(0.4) else [])
 
 
 def casters(shop: Workshop, x: float, z: float) -> list[Piece]:

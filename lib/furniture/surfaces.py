@@ -4,7 +4,7 @@ One idea makes them all. A closed curve, the section, is swept along one axis of
 and shrinks (the profile), and its middle may wander off (the bend). The result is stretched until it touches the
 six faces of the cube, and the leaf's box carries it into the world.
 
-    section     |u|^e + |v|^e = 1      e = 2 is round, e = 12 nearly square
+    section     |u|^e + |v|^e = 1      e = 2 is round, e = 40 nearly square
     profile     (share of the way, size of the section) pairs
     bend        how far the middle line bulges, in half thicknesses of the section, and along which axis
 
@@ -23,6 +23,7 @@ from torch import Tensor
 from lib.extractor.partgraph import Part, PartGraph
 
 SIDES = 24  # corners of a section
+ROUND, SQUARE = 2.0, 40.0  # exponents
 POSTS = {
     *(
         "leg",
@@ -58,7 +59,7 @@ def sweep(along: int, exponent: float, profile: tuple, bend: float = 0.0, bent: 
     The middle line bulges towards axis number `bent` by a parabola that is `bend` high at both ends.
     """
     share, size = np.array(resampled(profile)).T
-    angle = (np.arange(SIDES) + 0.5) * 2 * np.pi / SIDES
+    angle = np.arange(SIDES) * 2 * np.pi / SIDES  # with the corners of a square among them
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     section = np.sign(circle) * np.abs(circle) ** (2 / exponent)
     rings = np.empty((len(share), SIDES, 3))
@@ -106,29 +107,26 @@ def unit_mesh(label: str, size: np.ndarray, style: int = 0) -> trimesh.Trimesh:
     short, middle, long = np.argsort(size, kind="stable")
     slender = size[long] > 2.5 * size[middle]
     if label in FRONTS:
-        return sweep(2, 12.0, KNOBBED)
+        return sweep(2, SQUARE, KNOBBED)
     if label == "wheel":
-        return sweep(0, 2.0, STRAIGHT)
+        return sweep(0, ROUND, STRAIGHT)
     if label == "rocker":
-        return sweep(2, 8.0, STRAIGHT, bend=2.5, bent=1)
+        return sweep(2, SQUARE, STRAIGHT, bend=2.5, bent=1)
     if label in POSTS and slender:
         # Only an upright post knows its top from its bottom; a mirrored lying one would be thick at the wrong end.
-        upright = (STRAIGHT, STRAIGHT, TAPERED, TURNED, VASE)
-        profile = upright[rng.integers(5)] if long == 1 else (STRAIGHT, SPINDLE)[rng.integers(2)]
-        return sweep(
-            int(long), 2.0 if profile in (TURNED, VASE, SPINDLE) else (2.0, 10.0)[rng.integers(2)], profile
-        )
+        profiles = (STRAIGHT, STRAIGHT, TAPERED, TURNED, VASE) if long == 1 else (STRAIGHT, SPINDLE)
+        profile = profiles[rng.integers(len(profiles))]
+        section = (ROUND, SQUARE)[rng.integers(2)] if profile in (STRAIGHT, TAPERED) else ROUND
+        return sweep(int(long), section, profile)
     if label == "back_single_surface":
-        return sweep(0, (6.0, 10.0)[rng.integers(2)], STRAIGHT, bend=(0.0, 1.0, 2.0)[rng.integers(3)])
+        bend = (0.0, 1.0, 2.0)[rng.integers(3)]
+        return sweep(0, (8.0, SQUARE)[rng.integers(2)], STRAIGHT, bend)
     if label in SOFT:
         return sweep(int(short), (5.0, 8.0, 12.0)[rng.integers(3)], PILLOW)
-    if label in PLATES:
-        return sweep(
-            int(short),
-            (2.0 if label == "pedestal" and size[short] < 0.3 * size[long] else 8.0, 12.0)[rng.integers(2)],
-            STRAIGHT,
-        )
-    return sweep(int(long if slender else short), 12.0, STRAIGHT)
+    if label in PLATES and size[middle] > 0.4 * size[long] > 2 * size[short]:
+        corners = (ROUND if label == "pedestal" else 8.0, SQUARE)[rng.integers(2)]
+        return sweep(int(short), corners, STRAIGHT)
+    return sweep(int(long if slender else short), SQUARE, STRAIGHT)
 
 
 def style_of(graph: PartGraph) -> int:

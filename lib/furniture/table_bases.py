@@ -1,8 +1,6 @@
 """Bases of tables. Each function makes the children of a table_base, from the floor to `frame.under`."""
 
-import numpy as np
-
-from .chair_bases import Leg, stretchers
+from .chair_bases import Leg, directions, spoke, stretchers
 from .kit import Piece, Workshop, group
 
 
@@ -107,16 +105,10 @@ def pedestal(shop: Workshop, frame) -> list[Piece]:
 
 def star_feet(shop: Workshop, count: int, reach: tuple[float, float], thick: float) -> list[Piece]:
     """Feet around a column, between two distances from the middle, higher at the inner one."""
-    turn = np.pi / 4 if count == 4 and shop.chance(0.5) else 0.0
     rise, pieces = shop.pick(0.0, reach[1] * shop.between(0.1, 0.3)), []
-    for angle in turn + np.arange(count) * 2 * np.pi / count:
-        direction = np.array([np.sin(angle), 0.0, -np.cos(angle)])
-        if direction[0] > -1e-9:  # the others are mirror images
-            hub, tip = direction * reach[0] + (0, 0.04 + rise, 0), direction * reach[1] + (0, thick / 2, 0)
-            along = 0 if abs(direction[0]) > abs(direction[2]) + 1e-9 else 2
-            start, end = (hub, tip) if direction[along] > 0 else (tip, hub)
-            foot = shop.beam("foot", start, end, (thick, thick), along)
-            pieces += shop.both(foot) if direction[0] > 1e-9 else [foot]
+    for direction in directions(shop, count):
+        foot = spoke(shop, "foot", direction, reach, (0.04 + rise, thick / 2), thick)
+        pieces += shop.both(foot) if direction[0] > 1e-9 else [foot]
     return pieces
 
 

@@ -20,13 +20,14 @@ import zipfile
 import zlib
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
-from data_scripts.extraction_worker import extract_chunk
+from data_scripts.extraction_worker import UNREADABLE, extract_chunk
 from data_scripts.journal import Journal, write_whole
 from lib.datasets import CATEGORIES, REPOSITORY, DataError
 from lib.extractor import PartGraphError
@@ -97,22 +98,35 @@ def category_of(source: Path, name: str) -> str:
 def workers(count: int, scheduler: str | None) -> Iterator[None]:
     """Where chunks are worked on: `count` processes (-1: one for each core), or a running Dask cluster.
 
-    Raises DataError for a cluster that is not there.
+    Raises DataError for a cluster that is not there, and for workers that end before their work does.
     """
-    if scheduler is None:
-        with parallel_config("loky", n_jobs=count):
+    with parallel_config("loky", n_jobs=count) if scheduler is None else _cluster(scheduler):
+        try:
             yield
-        return
+        except BrokenExecutor as error:
+            raise DataError(
+                "a worker was ended from outside, perhaps for want of memory; the same command goes on from here, "
+                "fewer --workers need less memory"
+            ) from error
+
+
+@contextmanager
+def _cluster(scheduler: str) -> Iterator[None]:
     try:
-        from distributed import Client  # optional: pip install "shape-programs[cluster]"
+        from distributed import Client, KilledWorker  # optional: pip install "shape-programs[cluster]"
     except ImportError as error:
         raise DataError(f'--scheduler needs Dask: pip install "shape-programs[cluster]" ({error})') from error
     try:
         client = Client(scheduler, timeout=10)
     except (OSError, ValueError) as error:
         raise DataError(f"no Dask scheduler answers at {scheduler} ({error})") from error
-    with client, parallel_config("dask", n_jobs=-1):
-        yield
+    try:
+        with client, parallel_config("dask", n_jobs=-1):
+            yield
+    except KilledWorker as error:
+        raise DataError(
+            f"the cluster's workers ended ({error}); the same command goes on from here"
+        ) from error
 
 
 def extract_all(options: argparse.Namespace) -> tuple[list[dict], int]:
@@ -186,7 +200,7 @@ def run(options: argparse.Namespace) -> int:
     rows, count = extract_all(options)
     speed = count / (time.monotonic() - started)
     summary = report(options.out, rows)
-    if all(row["reason"] == "error" for row in rows):
+    if all(row["reason"] == UNREADABLE for row in rows):
         raise DataError(
             f"none of {len(rows)} files gave a part graph; {rows[0]['name']}: {rows[0]['detail']}"
         )

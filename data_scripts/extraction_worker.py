@@ -14,6 +14,7 @@ from lib.extractor import Extraction, Options, PartGraph, PartGraphError, extrac
 from lib.extractor.errors import PartGraphWarning
 from lib.extractor.files import load
 
+UNREADABLE = "unreadable"  # the reason given for a file without a part graph; the extractor has its own
 LONGEST_NAME = 250  # bytes of a file or folder name
 
 
@@ -22,9 +23,9 @@ def extract_chunk(
 ) -> list[dict]:
     """One row for the journal for each file of the chunk, name -> fingerprint. Never raises for a bad file.
 
-    A process that `parent` (its id) started ends with it.
+    A process other than `parent` (its id), which started it, ends with that one.
     """
-    if parent is not None and os.getppid() == parent:
+    if parent is not None and os.getpid() != parent:
         _end_with(parent)
     torch.set_num_threads(1)  # the processes share the cores; and sums come in the same order everywhere
     graphs, outcomes = {}, {}
@@ -32,18 +33,13 @@ def extract_chunk(
         try:
             graphs[name] = _load(source, name, fingerprint.split()[0])
         except Exception as error:  # whatever one file does, the others go on
-            outcomes[name] = _failure(error)
+            outcomes[name] = _failure(UNREADABLE, error)
     outcomes |= zip(graphs, _extract(list(graphs.values()), keep_rejected))
     return [{"name": name, "source": chunk[name], **outcomes[name]} for name in chunk]
 
 
 def _load(source: Path, name: str, category: str) -> PartGraph:
-    parts = name.split("/")
-    if (
-        not all(parts)
-        or ".." in parts
-        or max(len(part.encode(errors="replace")) for part in parts) > LONGEST_NAME
-    ):
+    if not _can_be_written(name):
         raise PartGraphError("its name cannot be the name of a program's file")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PartGraphWarning)  # thousands of files, each with odd labels
@@ -55,6 +51,13 @@ def _load(source: Path, name: str, category: str) -> PartGraph:
             ) from None  # the row has the name already; the folder differs between machines
 
 
+def _can_be_written(name: str) -> bool:
+    """Is it a path that stays below the folder it is put in, of names that a file system takes?"""
+    parts = name.split("/")
+    short = all(len(part.encode(errors="replace")) <= LONGEST_NAME for part in parts)
+    return short and all(parts) and ".." not in parts
+
+
 def _extract(graphs: list[PartGraph], keep_rejected: bool) -> list[dict]:
     """Outcomes of several graphs together or, should that fail, of each alone."""
     try:
@@ -63,7 +66,7 @@ def _extract(graphs: list[PartGraph], keep_rejected: bool) -> list[dict]:
         ]
     except Exception as error:
         if len(graphs) == 1:
-            return [_failure(error)]
+            return [_failure("error", error)]
         return [outcome for graph in graphs for outcome in _extract([graph], keep_rejected)]
 
 
@@ -78,9 +81,9 @@ def _outcome(extraction: Extraction) -> dict:
     }
 
 
-def _failure(error: Exception) -> dict:
+def _failure(reason: str, error: Exception) -> dict:
     what = str(error) if isinstance(error, PartGraphError) else f"{type(error).__name__}: {error}"
-    return {"accepted": False, "reason": "error", "detail": what, "f_score": None, "program": None}
+    return {"accepted": False, "reason": reason, "detail": what, "f_score": None, "program": None}
 
 
 @cache  # one watch a process

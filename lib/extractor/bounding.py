@@ -1,20 +1,25 @@
 """Stage 6: the boxes of inner parts, made anew from what they hold, and parts seen from the box they lie in.
 
-After rearranging and shortening the boxes a file gave to inner parts no longer fit. Each is replaced, from the
-leaves up, by the smallest box around its leaves among those that are turned like the world or like one of the leaves
-(a smallest box around boxes has a face flush with some face or edge; these are the turns that furniture uses).
-The root's box stands upright, and the whole shape is moved so that its center is the origin.
+After rearranging and shortening the boxes a file gave to inner parts no longer fit. Each is replaced by a tight box
+around its leaves. It stands upright, unless more than half of its leaves lean alike: then it leans with them, as the
+back of a chair, and its leaves are upright in it. (The authors' program takes the box of smallest volume, which also
+turns around parts that only happen to lie across each other.) Turning about the vertical does not count as leaning:
+what holds a part is mostly above and below it, and says nothing about such a turn. The root's box stands upright,
+and the whole shape is moved so that its center is the origin.
 """
 
 from dataclasses import replace
 
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from ..interpreters.cuboids import Cuboids
 from .partgraph import Part, PartGraph, stack
-from .snapping import rename_axes
+from .snapping import UPRIGHT, rename_axes, turning_axis
 
-WORTH_TURNING = 0.95  # a turned box must have less than this share of the upright one's volume
+
+LEANING = 0.5  # how vertical (cosine) the axis of a turn may be to count as leaning
 
 
 def refit(graph: PartGraph) -> PartGraph:
@@ -42,15 +47,21 @@ def moved(box: Cuboids, shift) -> Cuboids:
 
 
 def enclosing_box(boxes: Cuboids) -> Cuboids:
-    """A small box (single) around boxes (n): upright, or turned like one of them where that saves enough."""
-    axes = torch.cat([torch.eye(3, dtype=torch.float64).unsqueeze(0), boxes.axes])
-    along = boxes.corners().reshape(-1, 3) @ axes.mT  # (turns, corners, 3)
-    low, high = along.amin(1), along.amax(1)
-    volume = (high - low).prod(-1)
-    volume[0] *= WORTH_TURNING
-    best = int((volume <= volume.min() * (1 + 1e-9)).double().argmax())  # the first of equals
-    center = (low[best] + high[best]) / 2 @ axes[best]
-    return rename_axes(Cuboids((high - low)[[best]], center.unsqueeze(0), axes[[best]]))[0]
+    """A tight box (single) around boxes (n): upright, or leaning as more than half of them do."""
+    axes = _common_axes(boxes)
+    along = boxes.corners().reshape(-1, 3) @ axes.mT
+    low, high = along.amin(0), along.amax(0)
+    return rename_axes(Cuboids((high - low)[None], ((low + high) / 2 @ axes)[None], axes[None]))[0]
+
+
+def _common_axes(boxes: Cuboids) -> Float[Tensor, "3 3"]:
+    upright = torch.eye(3, dtype=torch.float64)
+    axes = torch.cat([upright[None], boxes.axes])
+    seen = (boxes.axes.unsqueeze(0) @ axes.mT.unsqueeze(1)).abs().amax(-1)  # how straight each box is in each frame
+    leaning = turning_axis(rename_axes(boxes).axes)[:, 1].abs() < LEANING
+    alike = (seen >= UPRIGHT).all(-1).sum(-1) * torch.cat([torch.ones(1, dtype=torch.bool), leaning])  # (n + 1)
+    best = int(alike.argmax())  # the first of equals: upright before turned
+    return axes[best] if 2 * alike[best] > len(boxes) else upright
 
 
 def seen_from(box: Cuboids, part: Part) -> Part:

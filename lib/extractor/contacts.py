@@ -73,7 +73,7 @@ def connecting_contacts(boxes: Cuboids, size: Float[Tensor, "3"]) -> list[Contac
             return contacts
 
 
-def floating(count: int, contacts: list[Contact], holds: dict[int, set[int]] | None = None) -> set[int]:
+def floating(count: int, contacts, holds: dict[int, frozenset[int]] | None = None) -> set[int]:
     """The cuboids that no chain of contacts joins to the bounding box.
 
     holds   for some cuboids the partners that may hold them; others are held by whatever they touch

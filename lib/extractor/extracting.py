@@ -11,18 +11,19 @@ import torch
 from ..interpreters.shapeassembly import Program, ProgramError, execute_many
 from .arranging import collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers, LEVELS
 from .bounding import refit, seen_from
-from .contacts import BOTTOM, TOP, connecting_contacts, mark_firm
+from .contacts import connecting_contacts, mark_firm
 from .errors import RejectedError
 from .labels import RANKED
-from .ordering import AS_GOOD, grounded_order
+from .ordering import grounded_order
 from .partgraph import Part, PartGraph, stack
-from .placing import judge, ways_to_place
+from .placing import Way, judge, ways_to_place
 from .shortening import shorten
 from .snapping import is_upright, rename_axes, snap, snap_leaves
 from .subprograms import join_components
-from .symmetry import find_groups
+from .symmetry import find_groups, open_ways
 from .validating import check_program, judge_shape
-from .writing import BlockFacts, write_program
+from .facts import BlockFacts
+from .writing import write_program
 
 
 @dataclass(frozen=True)
@@ -106,10 +107,10 @@ def survey(node: Part, category: str, options: Options = Options(), level: int =
         joined = join_components(list(facts.parts), facts.boxes, list(facts.contacts), size)
         if len(joined) != len(facts.parts):
             facts = look([seen_from_same(part) for part in joined], size, category, options)
+    facts = replace(facts, ways=tuple(judged_ways(facts, options)))
     if options.macros:
-        groups = find_groups(list(facts.parts), facts.boxes, facts.aligned, list(facts.contacts), size)
-        facts = replace(facts, groups=tuple(groups))
-    facts = replace(facts, ways=tuple(place(facts, options)))
+        facts = replace(facts, groups=tuple(find_groups(facts)))
+    facts = replace(facts, ways=tuple(ordered_ways(facts)))
     inner = {
         i: survey(facts.parts[i], category, options, level + 1) for i in facts.written if facts.parts[i].children
     }
@@ -132,23 +133,22 @@ def look(parts: list[Part], size, category: str, options: Options) -> BlockFacts
     return BlockFacts(tuple(parts), boxes, aligned, size, tuple(contacts))
 
 
-def place(facts: BlockFacts, options: Options):
-    """How each written part is held, in grounded order. Raises RejectedError ("disconnected")."""
-    written, standing = facts.written, {BOTTOM, TOP, *facts.written}
-    contacts = [c for c in facts.contacts if c.first in standing and c.second in standing]
-    holds = {group.members[0]: group.holds for group in facts.groups}
+def judged_ways(facts: BlockFacts, options: Options) -> list[Way]:
+    """Every way to hold each part, with its misfit."""
     ways = [
         way
-        for i in written
-        for way in ways_to_place(i, contacts, facts.boxes, facts.size, not facts.aligned[i], options.macros)
-        if holds.get(i, standing).issuperset(way.partners)
+        for i, upright in enumerate(facts.aligned.tolist())
+        for way in ways_to_place(i, list(facts.contacts), facts.boxes, facts.size, not upright, options.macros)
     ]
     misfits = judge(ways, facts.boxes, facts.aligned, facts.size).tolist()
-    own = {i: [] for i in written}
-    for way, misfit in zip(ways, misfits):
-        own[way.cuboid].append(replace(way, misfit=misfit))
-    tolerance = AS_GOOD * float(facts.size.norm())
-    return grounded_order(own, tolerance, facts.aligned.tolist(), lambda i: facts.parts[i].label)
+    return [replace(way, misfit=misfit) for way, misfit in zip(ways, misfits)]
+
+
+def ordered_ways(facts: BlockFacts) -> list[Way]:
+    """How each written part is held, in grounded order. Raises RejectedError ("disconnected")."""
+    left = open_ways(facts.ways, facts.groups)
+    own = {i: [way for way in left if way.cuboid == i] for i in facts.written}
+    return grounded_order(own, facts.tolerance, facts.aligned.tolist(), lambda i: facts.parts[i].label)
 
 
 def extract(graph: PartGraph, options: Options = Options()) -> Extraction:
@@ -166,7 +166,7 @@ def extract_many(graphs: Sequence[PartGraph], options: Options = Options()) -> l
         if not valid[row]:
             written[i] = replace(written[i], reason="not finite", detail="its geometry cannot be computed")
         elif not written[i].reason:
-            reason, detail, f_score = judge_shape(shapes[row], graphs[i])
+            reason, detail, f_score = judge_shape(shapes[row], collapse(graphs[i]))
             written[i] = replace(written[i], reason=reason, detail=detail, f_score=f_score)
     return [
         extraction if extraction.accepted or options.keep_rejected else replace(extraction, program=None)

@@ -16,8 +16,6 @@ from .contacts import BOTTOM, TOP
 from .errors import RejectedError
 from .placing import Way
 
-AS_GOOD = 0.004  # misfits that differ by less than this share of the block's diagonal are as good as each other
-
 
 def grounded_order(
     ways: dict[int, list[Way]],
@@ -54,11 +52,7 @@ def grounded_order(
 def _preference(way: Way, tolerance: float, aligned: list[bool]) -> tuple:
     """What is better comes first: fit, a macro, more connections, then the paper's ties."""
     on_tilted = tuple(partner >= 0 and not aligned[partner] for partner in way.partners)
-    return (_steps(way, tolerance), not way.face, -len(way.partners), way.partners, on_tilted, way.kinds, way.points)
-
-
-def _steps(way: Way, tolerance: float) -> int:
-    return int(min(way.misfit / tolerance, 1e6))
+    return (way.steps(tolerance), not way.face, -len(way.partners), way.partners, on_tilted, way.kinds, way.points)
 
 
 def _loss(key: tuple, best: tuple) -> tuple:

@@ -20,6 +20,7 @@ from ..interpreters.shapeassembly.attaching import choose, move, stretch_and_tur
 from ..interpreters.shapeassembly.growing import grow
 from ..interpreters.shapeassembly.program import FACES
 from .contacts import BOTTOM, MIDDLE, TOP, Contact
+from .snapping import turning_axis
 
 DIGITS = 3  # decimals of local coordinates in the text, as in the authors' data set
 AT_CENTER = 0.05  # how far (L1, local) a contact may be from a face's center for a squeeze (the authors' program)
@@ -42,9 +43,9 @@ class Way:
     face: str = ""  # of a squeeze
     misfit: float = 0.0  # block units
 
-    @property
-    def statements(self) -> int:
-        return 1 if self.face else len(self.partners)
+    def steps(self, tolerance: float) -> int:
+        """The misfit in whole steps of `tolerance`: ways with as many are as good as each other."""
+        return int(min(self.misfit / tolerance, 1e6))
 
 
 def ways_to_place(
@@ -79,12 +80,6 @@ def ways_to_place(
                 )
             )
     return ways
-
-
-def turning_axis(axes: Float[Tensor, "3 3"]) -> Float[Tensor, "3"]:
-    """The unit axis about which a box turns from upright to `axes` (rows right, top, front)."""
-    skewed = torch.stack([axes[1, 2] - axes[2, 1], axes[2, 0] - axes[0, 2], axes[0, 1] - axes[1, 0]])
-    return skewed / skewed.norm().clamp(min=1e-12)
 
 
 def _aimed(box: Cuboids, partner: Cuboids, first: Point, second: Point, turn: Tensor) -> tuple[Point, Point]:

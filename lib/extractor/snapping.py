@@ -42,6 +42,19 @@ def rename_axes(boxes: Cuboids) -> Cuboids:
     return Cuboids((turn.abs() @ boxes.size.unsqueeze(-1)).squeeze(-1), boxes.center, turn @ boxes.axes)
 
 
+def turning_axis(axes: Float[Tensor, "*n 3 3"]) -> Float[Tensor, "*n 3"]:
+    """The unit axis about which each box turns from upright to `axes` (rows right, top, front)."""
+    skewed = torch.stack(
+        [
+            axes[..., 1, 2] - axes[..., 2, 1],
+            axes[..., 2, 0] - axes[..., 0, 2],
+            axes[..., 0, 1] - axes[..., 1, 0],
+        ],
+        -1,
+    )
+    return skewed / skewed.norm(dim=-1, keepdim=True).clamp(min=1e-12)
+
+
 def is_upright(boxes: Cuboids) -> Bool[Tensor, " n"]:
     """Which boxes, their axes renamed, count as standing upright in their frame."""
     straight = torch.diagonal(boxes.axes, dim1=-2, dim2=-1) >= UPRIGHT

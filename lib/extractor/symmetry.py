@@ -10,11 +10,11 @@ parts are compared with all that is in them, as the language would copy it.
 Condition (i) of the paper keeps copies from going where they hold something that would fall without them. We ask for
 exactly that, and so find more groups: members must touch at least one part in common, at corresponding places (the
 source is then held by such parts only, since its copies will be too), and without the copies everything else must
-still have its holds: one that leads to the bounding box, and a second one if it is tilted, for two points turn a
-cuboid. The first slat of a row may touch the seat, and the last one the head.
+still lead to the bounding box and be held as well as before. The first slat of a row may touch the seat, and the
+last one the head.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import torch
 from jaxtyping import Bool, Float
@@ -23,7 +23,9 @@ from torch import Tensor
 from ..interpreters.cuboids import Cuboids
 from ..interpreters.shapeassembly.program import AXES
 from .contacts import BOTTOM, TOP, Contact, floating
+from .facts import BlockFacts, Group
 from .partgraph import Part, stack
+from .placing import Way, bounding_box
 
 ALIKE = 0.015  # share of the block's longest side: how far corners of a copy may lie from where they should
 UNEVEN = 0.1  # share of the spacing of a row: how far a member may be from its place (the authors' program)
@@ -31,25 +33,9 @@ NEARLY_NOTHING = 1e-6  # world units
 SAME_POINT = 0.1  # the same for the places where copies touch other parts (the authors' program: 0.1 of about 1)
 
 
-@dataclass(frozen=True)
-class Group:
-    """Copies of one part: `members[0]` is written down. `kind` is "reflect" or "translate", `axis` X, Y or Z."""
-
-    kind: str
-    axis: str
-    members: tuple[int, ...]
-    distance: float = 0.0  # of the last member of a row from the first, as a share of the block's side
-    holds: frozenset[int] = frozenset()  # parts that hold the source, as their images hold the copies
-
-
-def find_groups(
-    parts: list[Part],
-    boxes: Cuboids,
-    aligned: Bool[Tensor, " n"],
-    contacts: list[Contact],
-    size: Float[Tensor, "3"],
-) -> list[Group]:
-    """Groups of a block's parts; `boxes` are their boxes (n), straightened. No part is in two groups."""
+def find_groups(facts: BlockFacts) -> list[Group]:
+    """Groups of a block's parts; `facts.ways` are all ways to hold them. No part is in two groups."""
+    parts, boxes, size = facts.parts, facts.boxes, facts.size
     mirrored = [mirror_images(parts, boxes, axis, size) for axis in range(3)]
     rows = [row for axis in range(3) for row in find_rows(parts, boxes, axis, size)]
     candidates = sorted((row for row in rows if len(row.members) > 2), key=lambda row: -len(row.members))
@@ -57,38 +43,56 @@ def find_groups(
         Group("reflect", AXES[axis], (i, j)) for axis in range(3) for i, j in mirrored[axis].nonzero().tolist()
     ]
     candidates += [row for row in rows if len(row.members) == 2]
-    touched = touched_parts(len(parts), contacts)
-    groups: list[Group] = []
+    touched = touched_parts(len(parts), facts.contacts)
+    groups: tuple[Group, ...] = ()
     for group in candidates:
         if any(not set(group.members).isdisjoint(other.members) for other in groups):
             continue
-        holds = common_holds(group, touched, boxes, SAME_POINT * float(size.max()))
-        more = [*groups, replace(group, holds=frozenset(holds))]
-        if holds and not falling(len(parts), contacts, more) and not turning(aligned.tolist(), contacts, more):
+        holds = common_holds(group, touched, facts)
+        more = (*groups, replace(group, holds=frozenset(holds)))
+        if holds and not falling(facts, more) and not worse(facts, more):
             groups = more
-    return groups
+    return list(groups)
 
 
-def falling(count: int, contacts: list[Contact], groups: list[Group]) -> set[int]:
+def copies_of(groups: tuple[Group, ...]) -> set[int]:
+    """The parts that macros make."""
+    return {member for group in groups for member in group.members[1:]}
+
+
+def open_ways(ways: tuple[Way, ...], groups: tuple[Group, ...]) -> list[Way]:
+    """The ways that are left when copies are not written down, and sources are held as their copies will be."""
+    copies, holds = copies_of(groups), {group.members[0]: group.holds for group in groups}
+    return [
+        way
+        for way in ways
+        if way.cuboid not in copies
+        and copies.isdisjoint(way.partners)
+        and (way.cuboid not in holds or holds[way.cuboid].issuperset(way.partners))
+    ]
+
+
+def falling(facts: BlockFacts, groups: tuple[Group, ...]) -> set[int]:
     """The parts that would hang on nothing if of each group only the source were written down."""
-    copies = {member for group in groups for member in group.members[1:]}
-    left = [contact for contact in contacts if copies.isdisjoint((contact.first, contact.second))]
-    return floating(count, left, {group.members[0]: group.holds for group in groups}) - copies
+    copies = copies_of(groups)
+    left = [contact for contact in facts.contacts if copies.isdisjoint((contact.first, contact.second))]
+    return floating(len(facts.parts), left, {group.members[0]: group.holds for group in groups}) - copies
 
 
-def turning(aligned: list[bool], contacts: list[Contact], groups: list[Group]) -> set[int]:
-    """The tilted parts that would be left with fewer than the two holds that turn them, though they have them."""
-    copies = {member for group in groups for member in group.members[1:]}
-    holds = {group.members[0]: group.holds for group in groups}
-    lost = set()
-    for part in (i for i, upright in enumerate(aligned) if not upright and i not in copies):
-        partners = {c.partner(part) for c in contacts if part in (c.first, c.second)}
-        if len((partners - copies) & holds.get(part, partners)) < min(2, len(partners)):
-            lost.add(part)
-    return lost
+def worse(facts: BlockFacts, groups: tuple[Group, ...]) -> set[int]:
+    """The parts that could no longer be held as well as without the groups, such as a bar that lost one of its ends."""
+    before, after = (_best_steps(ways, facts.tolerance) for ways in (facts.ways, open_ways(facts.ways, groups)))
+    return {part for part in after if after[part] > before[part]}
 
 
-def touched_parts(count: int, contacts: list[Contact]) -> list[dict[int, Tensor]]:
+def _best_steps(ways, tolerance: float) -> dict[int, int]:
+    best: dict[int, int] = {}
+    for way in ways:
+        best[way.cuboid] = min(best.get(way.cuboid, 10**9), way.steps(tolerance))
+    return best
+
+
+def touched_parts(count: int, contacts: tuple[Contact, ...]) -> list[dict[int, Tensor]]:
     """For each part the parts (or BOTTOM, TOP) that it touches, and where."""
     touched: list[dict[int, Tensor]] = [{} for _ in range(count)]
     for contact in contacts:
@@ -99,22 +103,30 @@ def touched_parts(count: int, contacts: list[Contact]) -> list[dict[int, Tensor]
     return touched
 
 
-def common_holds(group: Group, touched: list[dict[int, Tensor]], boxes: Cuboids, tolerance: float) -> set[int]:
-    """The parts outside the group that all its members touch, at corresponding places."""
-    source, axis = group.members[0], AXES.index(group.axis)
+def common_holds(group: Group, touched: list[dict[int, Tensor]], facts: BlockFacts) -> set[int]:
+    """The parts outside the group that all its members touch, at corresponding places that lie in them."""
+    source, axis, longest = group.members[0], AXES.index(group.axis), float(facts.size.max())
     common = touched[source].keys() - set(group.members)
     for member in group.members[1:]:
-        shift = boxes.center[member, axis] - boxes.center[source, axis]
+        shift = facts.boxes.center[member, axis] - facts.boxes.center[source, axis]
         for partner in list(common):
-            wanted = touched[source][partner].clone()
-            wanted[axis] = -wanted[axis] if group.kind == "reflect" else wanted[axis] + shift
+            image = touched[source][partner].clone()
+            image[axis] = -image[axis] if group.kind == "reflect" else image[axis] + shift
             there = touched[member].get(partner)
-            if there is None or float((wanted - there).norm()) > tolerance:
+            if there is None or float((image - there).norm()) > SAME_POINT * longest:
+                common.discard(partner)
+            elif float((image - into(facts, partner, image)).norm()) > ALIKE * longest:
                 common.discard(partner)
     return common
 
 
-def mirror_images(parts: list[Part], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> Bool[Tensor, "n n"]:
+def into(facts: BlockFacts, partner: int, place: Float[Tensor, "3"]) -> Float[Tensor, "3"]:
+    """Where a copy is attached to a partner: the place itself, or the point of the partner's box nearest to it."""
+    box = facts.boxes[partner] if partner not in (BOTTOM, TOP) else bounding_box(facts.size)
+    return box.world(box.local(place).clamp(0, 1))
+
+
+def mirror_images(parts: tuple[Part, ...], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> Bool[Tensor, "n n"]:
     """[i, j]: part j is what `reflect` makes of part i, and i is the one on the lower side."""
     tolerance = ALIKE * float(size.max())
     mirror = torch.ones(3, dtype=torch.float64)
@@ -128,7 +140,7 @@ def mirror_images(parts: list[Part], boxes: Cuboids, axis: int, size: Float[Tens
     return alike
 
 
-def find_rows(parts: list[Part], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> list[Group]:
+def find_rows(parts: tuple[Part, ...], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> list[Group]:
     """Evenly spaced rows of equal parts along an axis, the longest first where several overlap."""
     tolerance = ALIKE * float(size.max())
     along = torch.zeros(3, dtype=torch.float64)

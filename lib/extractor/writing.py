@@ -6,46 +6,15 @@ shapes much larger or smaller than 1, sizes keep the same relative precision.
 """
 
 import math
-from dataclasses import dataclass
 
-import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
-from ..interpreters.cuboids import Cuboids
 from ..interpreters.shapeassembly import Attach, Block, Cuboid, Program, Reflect, Squeeze, Translate
 from ..interpreters.shapeassembly.program import BBOX
-from .contacts import Contact
-from .partgraph import Part
+from .facts import BlockFacts
 from .placing import DIGITS, Way
 from .symmetry import Group
-
-
-@dataclass(frozen=True, eq=False)
-class BlockFacts:
-    """All that is known about one node: its parts in their semantic order, seen from its box.
-
-    boxes, aligned  the parts' boxes (n), straightened, and which of them stand upright in the node's box
-    size            (3,) of the node's box
-    contacts        between all parts;  groups  of copies
-    ways            how each written part is held, in grounded order
-    inner           facts about the written parts that have parts themselves, by index
-    """
-
-    parts: tuple[Part, ...]
-    boxes: Cuboids
-    aligned: Bool[Tensor, " n"]
-    size: Float[Tensor, "3"]
-    contacts: tuple[Contact, ...] = ()
-    groups: tuple[Group, ...] = ()
-    ways: tuple[Way, ...] = ()
-    inner: "dict[int, BlockFacts] | None" = None
-
-    @property
-    def written(self) -> list[int]:
-        """Parts that get a line: all but the copies that a macro makes."""
-        copies = {member for group in self.groups for member in group.members[1:]}
-        return [i for i in range(len(self.parts)) if i not in copies]
 
 
 def write_program(root: BlockFacts) -> Program:

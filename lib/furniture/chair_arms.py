@@ -7,11 +7,9 @@ from .kit import Piece, Workshop, group
 
 def wooden(shop: Workshop, frame) -> list[Piece]:
     """A pair of arms beside the seat, of bars or as a frame; or one writing tablet."""
-    style = shop.pick(
-        post_arm, two_post_arm, tee_arm, slanted_arm, loop_arm, panel_arm, weights=(4, 2, 2, 2, 1, 1)
-    )
     if shop.chance(0.06):
         return [group("chair_arm", *writing_tablet(shop, frame))]
+    style = shop.weighted(STYLES)
     return shop.both(group("chair_arm", *style(shop, frame, shop.between(0.16, 0.24))))
 
 
@@ -30,12 +28,8 @@ def _arm_bar(shop: Workshop, frame, rise: float, wide: float, forward: float) ->
 def _arm_post(shop: Workshop, frame, rise: float, z: float, wide: float, thick: float) -> Piece:
     """An upright beside the seat, from its underside to the arm's bar."""
     x = frame.width / 2 - 0.002
-    return shop.block(
-        "arm_near_vertical_bar",
-        (x, x + wide),
-        (frame.under, frame.height + rise - 0.025),
-        (z - thick / 2, z + thick / 2),
-    )
+    y = (frame.under, frame.height + rise - 0.025)
+    return shop.block("arm_near_vertical_bar", (x, x + wide), y, (z - thick / 2, z + thick / 2))
 
 
 def post_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
@@ -58,10 +52,8 @@ def tee_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
     wide, half = shop.between(0.05, 0.08), frame.depth * shop.between(0.25, 0.35)
     x, y = frame.width / 2 - 0.002, frame.height + rise
     pad = shop.block("arm_horizontal_bar", (x - 0.01, x - 0.01 + wide), (y - 0.03, y), (-half, half))
-    return [
-        pad,
-        _arm_post(shop, frame, rise - 0.005, shop.between(-0.04, 0.03), 0.028, shop.between(0.03, 0.07)),
-    ]
+    z, thick = shop.between(-0.04, 0.03), shop.between(0.03, 0.07)
+    return [pad, _arm_post(shop, frame, rise - 0.005, z, 0.028, thick)]
 
 
 def slanted_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
@@ -85,10 +77,11 @@ def panel_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
     """A bar on a closed panel."""
     x, wide, forward = frame.width / 2 - 0.002, shop.between(0.03, 0.05), shop.between(0.7, 1.0)
     y, z = (frame.under, frame.height + rise - 0.025), (frame.rear, -frame.rear * forward)
-    return [
-        _arm_bar(shop, frame, rise, wide, forward),
-        shop.block("arm_near_vertical_bar", (x, x + 0.022), y, z),
-    ]
+    panel = shop.block("arm_near_vertical_bar", (x, x + 0.022), y, z)
+    return [_arm_bar(shop, frame, rise, wide, forward), panel]
+
+
+STYLES = {post_arm: 4, two_post_arm: 2, tee_arm: 2, slanted_arm: 2, loop_arm: 1, panel_arm: 1}
 
 
 def writing_tablet(shop: Workshop, frame) -> list[Piece]:
@@ -101,7 +94,7 @@ def writing_tablet(shop: Workshop, frame) -> list[Piece]:
 
 
 def upholstered(shop: Workshop, frame) -> list[Piece]:
-    """Upholstered blocks at both sides, plain, with a pad on top, or rolled over a panel."""
+    """Upholstered blocks at both sides, plain or with a pad on top."""
     wide, rise = shop.between(0.08, 0.2), shop.between(0.1, min(0.28, max(0.12, frame.back - 0.05)))
     x, top, bottom = frame.width / 2, frame.height + rise, frame.under * shop.pick(1.0, 1.0, 0.6)
     z = (frame.rear, -frame.rear - shop.pick(0.0, shop.between(0.0, 0.06)))

@@ -10,10 +10,8 @@ def leaning(frame, piece: Piece) -> Piece:
 
 def slab(shop: Workshop, frame) -> list[Piece]:
     """One upholstered board that stands on the seat or behind it."""
-    thick, half = (
-        shop.between(0.03, 0.06) + 0.25 * max(0, frame.thick - 0.1),
-        frame.width / 2 * shop.between(0.88, 1.0),
-    )
+    thick = shop.between(0.03, 0.06) + 0.25 * max(0, frame.thick - 0.1)
+    half = frame.width / 2 * shop.between(0.88, 1.0)
     behind = shop.chance(0.5)
     bottom = frame.height - frame.thick * shop.between(0.3, 1.0) if behind else frame.height
     z = (frame.rear - thick, frame.rear) if behind else (frame.rear, frame.rear + thick)
@@ -53,8 +51,8 @@ def cushions(people: int):
     return make
 
 
-def posts(shop: Workshop, frame, low: float = 0.0) -> tuple[list[Piece], float, float]:
-    """Two posts that rise from the rear corners of the seat; also their thickness and the free width between them."""
+def posts(shop: Workshop, frame) -> tuple[list[Piece], float, float]:
+    """Two posts at the rear corners of the seat; also the z of their middle and the free width between them."""
     thick, half = shop.between(0.025, 0.042), frame.width / 2
     behind = shop.chance(0.4)
     bottom = frame.under if behind else frame.height
@@ -81,28 +79,20 @@ def ladder(shop: Workshop, frame) -> list[Piece]:
 
 def spindles(shop: Workshop, frame) -> list[Piece]:
     """Upright bars under a top rail, between posts or without them, down to the seat or to a lower rail."""
-    high, top = shop.between(0.04, 0.09), frame.height + frame.back
     if shop.chance(0.6):
         sides, z, gap = posts(shop, frame)
-        rail = _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.025)
     else:
         sides, z, gap = [], frame.rear + 0.02, frame.width * shop.between(0.85, 1.0)
         frame.back = min(frame.back, 0.45)
-        top = frame.height + frame.back
-        rail = _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.03)
-    bottom, rails = frame.height, [rail]
+    high, top, bottom = shop.between(0.04, 0.09), frame.height + frame.back, frame.height
+    rails = [_rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.028)]
     if sides and shop.chance(0.5):
         bottom = frame.height + frame.back * shop.between(0.15, 0.3)
         rails.append(_rail(shop, "back_frame_horizontal_bar", gap, z, (bottom - 0.03, bottom), 0.025))
-    count, thick = shop.pick(*((2, 3, 4, 5, 6, 7) if sides else (4, 5, 6, 7))), shop.between(0.014, 0.02)
+    count, thick = shop.pick(*range(2 if sides else 4, 8)), shop.between(0.014, 0.02)
     step = gap / (count + 1) if sides else (gap - thick) / (count - 1)
     x = -step * (count - 1) / 2
-    bar = shop.block(
-        "back_surface_vertical_bar",
-        (x - thick / 2, x + thick / 2),
-        (bottom, top - high),
-        (z - thick / 2, z + thick / 2),
-    )
+    bar = shop.beam("back_surface_vertical_bar", (x, bottom, z), (x, top - high, z), (thick, thick))
     return [group("back_surface", *shop.row(bar, (step, 0, 0), count)), group("back_frame", *sides, *rails)]
 
 
@@ -132,27 +122,20 @@ def cross(shop: Workshop, frame) -> list[Piece]:
 
 
 def panel_on_posts(shop: Workshop, frame) -> list[Piece]:
-    """A board between, or in front of, two posts, clear of the seat."""
+    """A board between two posts, clear of the seat."""
     sides, z, gap = posts(shop, frame)
     top, low = frame.height + frame.back, frame.height + frame.back * shop.between(0.15, 0.5)
     thick = shop.between(0.018, 0.035)
-    board = shop.block(
-        "back_single_surface",
-        (-gap / 2, gap / 2),
-        (low, top - shop.between(0, 0.03)),
-        (z - thick / 2, z + thick / 2),
-    )
+    board = _rail(shop, "back_single_surface", gap, z, (low, top - shop.between(0, 0.03)), thick)
     return [group("back_surface", board), group("back_frame", *sides)]
 
 
 def framed(shop: Workshop, frame) -> list[Piece]:
     """A board in a full frame: two posts and two rails."""
     sides, z, gap = posts(shop, frame)
-    top, high, low = (
-        frame.height + frame.back,
-        shop.between(0.03, 0.05),
-        frame.height + frame.back * shop.pick(0.0, 0.2),
-    )
+    top = frame.height + frame.back
+    high = shop.between(0.03, 0.05)
+    low = frame.height + frame.back * shop.pick(0.0, 0.2)
     rails = [
         _rail(shop, "back_frame_horizontal_bar", gap, z, (top - high, top), 0.028),
         _rail(shop, "back_frame_horizontal_bar", gap, z, (low, low + high), 0.028),
@@ -172,11 +155,9 @@ def rail(shop: Workshop, frame) -> list[Piece]:
 
 def panel_on_stem(shop: Workshop, frame) -> list[Piece]:
     """A board on one or two narrow stems that come from behind the seat."""
-    thick, half, low = (
-        shop.between(0.04, 0.07),
-        frame.width / 2 * shop.between(0.75, 1.0),
-        shop.between(0.08, 0.16),
-    )
+    thick = shop.between(0.04, 0.07)
+    half = frame.width / 2 * shop.between(0.75, 1.0)
+    low = shop.between(0.08, 0.16)
     top = frame.height + frame.back
     board = shop.block(
         "back_single_surface", (-half, half), (frame.height + low, top), (frame.rear, frame.rear + thick)
@@ -186,11 +167,8 @@ def panel_on_stem(shop: Workshop, frame) -> list[Piece]:
         wide = shop.between(0.025, 0.05)
         stems = [shop.block("back_connector", (-wide, wide), y, (frame.rear - 0.022, frame.rear))]
     else:
-        stems = shop.both(
-            shop.block(
-                "back_connector", (half * 0.45, half * 0.45 + 0.03), y, (frame.rear - 0.022, frame.rear)
-            )
-        )
+        x = (half * 0.45, half * 0.45 + 0.03)
+        stems = shop.both(shop.block("back_connector", x, y, (frame.rear - 0.022, frame.rear)))
     return [group("back_surface", board), *stems]
 
 

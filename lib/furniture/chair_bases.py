@@ -23,18 +23,18 @@ def four_legs(shop: Workshop, frame, splay: float) -> tuple[Leg, Leg]:
     thick = shop.between(0.025, 0.05)
     inset = thick / 2 + (shop.between(0.02, 0.06) if splay else shop.between(0.0, 0.02))
     x, z, top = frame.width / 2 - inset, frame.depth / 2 - inset, frame.under
-    back_splay = splay * shop.pick(1.0, 1.5, 0.0, weights=(3, 1, 1))
-    side_splay = splay * shop.pick(1.0, 0.0, weights=(3, 1))
+    back_splay = splay * shop.weighted({1.0: 3, 1.5: 1, 0.0: 1})
+    side_splay = splay * shop.weighted({1.0: 3, 0.0: 1})
     front = Leg((x + side_splay, 0, z + splay), (x, top, z), thick)
     return front, Leg((x + side_splay, 0, -z - back_splay), (x, top, -z), thick)
 
 
 def legs(shop: Workshop, frame) -> list[Piece]:
     """Four legs, straight or splayed, with or without stretchers."""
-    splay = shop.pick(0.0, shop.between(0.03, 0.11), weights=(2, 3)) * min(1, frame.under / 0.4)
+    splay = shop.weighted({0.0: 2, shop.between(0.03, 0.11): 3}) * min(1, frame.under / 0.4)
     front, back = four_legs(shop, frame, splay)
     pieces = shop.both(front.build(shop), back.build(shop))
-    style = shop.pick("none", "sides", "H", "box", "front and back", "X", weights=(5, 1, 2, 2, 1, 0.8))
+    style = shop.weighted({"none": 5, "sides": 1, "H": 2, "box": 2, "front and back": 1, "X": 0.8})
     return pieces + stretchers(shop, style, front, back)
 
 
@@ -144,7 +144,10 @@ def _footrest(shop: Workshop, frame, column: float) -> list[Piece]:
 
 def star(shop: Workshop, frame) -> list[Piece]:
     """A column on three to six legs, often on casters, often with a mechanism under the seat."""
-    count, casters = shop.pick(3, 4, 5, 6, weights=(0.5, 3, 4, 0.5)), shop.chance(0.6)
+    count, casters = (
+        shop.weighted({3: 0.5, 4: 3, 5: 4, 6: 0.5}),
+        shop.chance(0.6 if frame.under < 0.5 else 0.25),
+    )
     column, top, pieces = shop.between(0.022, 0.04), frame.under, []
     if shop.chance(0.3) and top > 0.2:
         top -= 0.04
@@ -212,11 +215,9 @@ def rockers(shop: Workshop, frame) -> list[Piece]:
 
 def feet(shop: Workshop, frame) -> list[Piece]:
     """Short feet, straight or splayed; a long sofa stands on its middle, too."""
-    thick, inset, splay = (
-        shop.between(0.03, 0.07),
-        shop.between(0, 0.05),
-        shop.pick(0, shop.between(0.01, 0.04)),
-    )
+    thick = shop.between(0.03, 0.07)
+    inset = shop.between(0, 0.05)
+    splay = shop.pick(0, shop.between(0.01, 0.04))
     x, z = frame.width / 2 - inset - thick / 2, frame.depth / 2 - inset - thick / 2
     label = shop.pick("foot", "leg")
     front = Leg((x + splay, 0, z + splay), (x, frame.under, z), thick)

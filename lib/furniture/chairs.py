@@ -23,7 +23,6 @@ class Frame:
     thick: float  # of the seat with all that belongs to it
     lean: float = 0.0  # of the back, radians
     back: float = 0.0  # height of the back above the seat; 0 without a back
-    arm: float = 0.0  # how far the arms stick out beyond the seat's sides
 
     @property
     def under(self) -> float:
@@ -37,7 +36,7 @@ class Frame:
 
 def chair(workshop: Workshop) -> Piece:
     """One chair of a family drawn at random."""
-    family = workshop.pick(dining, office, sofa, stool, lounge, weights=(44, 15, 14, 10, 17))
+    family = workshop.weighted({dining: 44, office: 15, sofa: 14, stool: 10, lounge: 17})
     pieces = family(workshop)
     return group("chair", *[piece for piece in pieces if piece.children])
 
@@ -47,21 +46,20 @@ def dining(shop: Workshop) -> list[Piece]:
     frame = Frame(
         shop.between(0.40, 0.52), shop.between(0.40, 0.50), shop.between(0.42, 0.48), shop.between(0.03, 0.08)
     )
-    frame.back, frame.lean = shop.between(0.32, 0.60), shop.pick(0, shop.between(0.05, 0.25), weights=(1, 3))
-    base = shop.pick(
-        *(
-            bases.legs,
-            bases.runners,
-            bases.cantilever,
-            bases.pedestal,
-            bases.crossed,
-            bases.panels,
-            bases.h_legs,
-        ),
-        weights=(10, 2, 2, 1.5, 1, 0.7, 1.3),
+    frame.back, frame.lean = shop.between(0.32, 0.60), shop.weighted({0: 1, shop.between(0.05, 0.25): 3})
+    base = shop.weighted(
+        {
+            bases.legs: 10,
+            bases.runners: 2,
+            bases.cantilever: 2,
+            bases.pedestal: 1.5,
+            bases.crossed: 1,
+            bases.panels: 0.7,
+            bases.h_legs: 1.3,
+        }
     )
     back = shop.pick(*backs.WOODEN, backs.slab, backs.panel_on_posts)
-    arms = shop.pick(None, chair_arms.wooden, weights=(3, 2))
+    arms = shop.weighted({None: 3, chair_arms.wooden: 2})
     return _assemble(shop, frame, shop.pick(*seats.FIRM), base, back, arms, headrest=0.08)
 
 
@@ -71,22 +69,22 @@ def office(shop: Workshop) -> list[Piece]:
         shop.between(0.44, 0.54), shop.between(0.44, 0.52), shop.between(0.42, 0.52), shop.between(0.05, 0.11)
     )
     frame.back, frame.lean = shop.between(0.35, 0.70), shop.between(0.0, 0.22)
-    seat = shop.pick(seats.slab, seats.cushion_on_board)
-    back = shop.pick(backs.slab, backs.panel_on_stem, backs.panel_on_posts, backs.winged)
-    arms = shop.pick(None, chair_arms.wooden, weights=(1, 1.3))
+    seat = shop.weighted({seats.slab: 3, seats.cushion_on_board: 1})
+    back = shop.weighted({backs.slab: 3, backs.panel_on_stem: 3, backs.winged: 2, backs.panel_on_posts: 1})
+    arms = shop.weighted({None: 1, chair_arms.wooden: 1.3})
     return _assemble(shop, frame, seat, bases.star, back, arms, headrest=0.2)
 
 
 def sofa(shop: Workshop) -> list[Piece]:
     """An upholstered seat for one to four people."""
-    people = shop.pick(1, 2, 3, 4, weights=(4, 3, 3, 0.7))
+    people = shop.weighted({1: 4, 2: 3, 3: 3, 4: 0.7})
     frame = Frame(shop.between(0.54, 0.66) * people, shop.between(0.58, 0.78), shop.between(0.38, 0.46), 0.0)
     frame.thick = shop.between(0.14, 0.3)
     frame.back, frame.lean = shop.between(0.3, 0.55), shop.pick(0, shop.between(0.05, 0.22))
     seat = seats.cushions(people)
     back = shop.pick(backs.slab, backs.cushions(people), backs.winged if people == 1 else backs.slab)
-    base = shop.pick(bases.feet, bases.plinth, bases.low_runners, weights=(3, 1, 1))
-    arms = shop.pick(None, chair_arms.upholstered, weights=(1, 5))
+    base = shop.weighted({bases.feet: 3, bases.plinth: 1, bases.low_runners: 1})
+    arms = shop.weighted({None: 1, chair_arms.upholstered: 5})
     return _assemble(shop, frame, seat, base, back, arms, headrest=0.06)
 
 
@@ -95,11 +93,11 @@ def stool(shop: Workshop) -> list[Piece]:
     side, tall = shop.between(0.3, 0.4), shop.chance(0.75)
     height = shop.between(0.60, 0.78) if tall else shop.between(0.38, 0.5)
     frame = Frame(side, side * shop.between(0.9, 1.0), height, shop.between(0.05, 0.1))
-    back = shop.pick(None, backs.slab, backs.rail, backs.panel_on_posts, weights=(3, 1, 1, 1))
+    back = shop.weighted({None: 3, backs.slab: 1, backs.rail: 1, backs.panel_on_posts: 1})
     if back:
         frame.back, frame.lean = shop.between(0.16, 0.32), shop.between(0, 0.15)
-    base = shop.pick(
-        bases.legs, bases.tripod, bases.star, bases.pedestal, bases.runners, weights=(4, 2, 3, tall, 1)
+    base = shop.weighted(
+        {bases.legs: 4, bases.tripod: 2, bases.star: 3, bases.pedestal: tall, bases.runners: 1}
     )
     return _assemble(shop, frame, shop.pick(*seats.FIRM), base, back, None, headrest=0)
 
@@ -113,7 +111,9 @@ def lounge(shop: Workshop) -> list[Piece]:
     seat = shop.pick(seats.slab, seats.cushion_on_board, seats.cushion_on_frame, seats.slats)
     base = shop.pick(bases.legs, bases.rockers, bases.runners, bases.cantilever, bases.star, bases.h_legs)
     back = shop.pick(backs.slab, backs.panel_on_posts, backs.ladder, backs.spindles, backs.winged)
-    arms = shop.pick(None, chair_arms.wooden, chair_arms.upholstered, weights=(1, 4, 1))
+    arms = shop.weighted({None: 1, chair_arms.wooden: 5})
+    if base is bases.legs and seat is not seats.slats and shop.chance(0.4):
+        arms = chair_arms.upholstered
     return _assemble(shop, frame, seat, base, back, arms, headrest=0.15)
 
 

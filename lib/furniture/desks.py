@@ -14,12 +14,8 @@ def drawer(shop: Workshop, label: str, x: tuple, y: tuple, z: tuple) -> Piece:
         middle_x -= np.sign(middle_x + 1e-9) * (abs(x[1] - x[0]) / 2 - 0.035)
         wide, high = high, wide
     body = shop.block("other", x, y, (min(z), front))
-    handle = shop.block(
-        "other",
-        (middle_x - wide, middle_x + wide),
-        (middle_y - high, middle_y + high),
-        (front, front + 0.022),
-    )
+    across, upright = (middle_x - wide, middle_x + wide), (middle_y - high, middle_y + high)
+    handle = shop.block("other", across, upright, (front, front + 0.022))
     return group(label, body, handle)
 
 
@@ -31,15 +27,11 @@ def _tower(shop: Workshop, frame, outer: float, inner: float) -> list[Piece]:
         shop.block("vertical_side_panel", (inner, inner + thick), (0, frame.under), (-z, z)),
         shop.block("bottom_panel", (inner + thick, outer - thick), (low, low + thick), (-z, z)),
     ]
-    x, bottom, style = (
-        (inner + thick + 0.003, outer - thick - 0.003),
-        low + thick,
-        shop.pick("drawers", "door", weights=(3, 1)),
-    )
-    if style == "door":
-        return pieces + [
-            drawer(shop, "cabinet_door", x, (bottom + 0.003, frame.under - 0.003), (z - 0.02, z))
-        ]
+    x = (inner + thick + 0.003, outer - thick - 0.003)
+    bottom = low + thick
+    if shop.chance(0.25):
+        y = (bottom + 0.003, frame.under - 0.003)
+        return pieces + [drawer(shop, "cabinet_door", x, y, (z - 0.02, z))]
     count = shop.pick(2, 3, 4)
     pitch = (frame.under - bottom) / count
     first = drawer(shop, "drawer", x, (bottom + 0.003, bottom + pitch - 0.003), (-z * 0.9, z))
@@ -69,15 +61,12 @@ def one_tower(shop: Workshop, frame) -> list[Piece]:
     x, z = frame.base
     inner = x - shop.between(0.32, 0.48)
     pieces = _tower(shop, frame, x, inner)
-    if shop.chance(0.5):
+    side = shop.pick(-1.0, 1.0)  # where the box is not
+    if side > 0:
         pieces = [shop.copy(piece, mirrored=True) for piece in pieces]
-        side = 1.0
-    else:
-        side = -1.0
     if shop.chance(0.5):
-        pieces.append(
-            shop.block("vertical_side_panel", (side * x, side * (x - 0.025)), (0, frame.under), (-z, z))
-        )
+        sides = (side * x, side * (x - 0.025))
+        pieces.append(shop.block("vertical_side_panel", sides, (0, frame.under), (-z, z)))
         if shop.chance(0.6):
             pieces.append(_modesty_panel(shop, frame, *sorted((side * (x - 0.025), -side * inner)), -z))
         return pieces

@@ -5,7 +5,7 @@ Every piece is cut a little wrong (`Workshop.block`), as in PartNet: joints over
 A mirrored or repeated piece is a copy of the wrongly cut one, with a far smaller error of its own.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -70,12 +70,15 @@ class Workshop:
     def chance(self, probability: float) -> bool:
         return self.rng.random() < probability
 
-    def pick(self, *choices, weights: Sequence[float] | None = None):
-        """One of the choices; `weights` are relative."""
-        if weights is None:
-            return choices[int(self.rng.random() * len(choices))]
-        cumulative = np.cumsum(weights)
-        return choices[int(np.searchsorted(cumulative, self.rng.random() * cumulative[-1], side="right"))]
+    def pick(self, *choices):
+        """One of the choices, all equally likely."""
+        return choices[int(self.rng.random() * len(choices))]
+
+    def weighted(self, weights: dict):
+        """One of the keys; their values say how likely they are, relative to each other."""
+        cumulative = np.cumsum(list(weights.values()))
+        number = np.searchsorted(cumulative, self.rng.random() * cumulative[-1], side="right")
+        return list(weights)[int(number)]
 
     def block(self, label: str, x: tuple, y: tuple, z: tuple) -> Piece:
         """An upright box between the two coordinates of each axis (in any order)."""

@@ -31,8 +31,9 @@ class Carcass:
 
 def storage(workshop: Workshop) -> Piece:
     """One piece of a kind drawn at random."""
-    kinds = (bookcase, cabinet, chest, sideboard, wardrobe, rack, hutch, ladder)
-    kind = workshop.pick(*kinds, weights=(22, 18, 18, 14, 10, 7, 8, 3))
+    kind = workshop.weighted(
+        {bookcase: 22, cabinet: 18, chest: 18, sideboard: 14, wardrobe: 10, rack: 7, hutch: 8, ladder: 3}
+    )
     pieces = kind(workshop)
     if workshop.chance(0.5):
         return group("storage_furniture", group("cabinet", *pieces))
@@ -44,22 +45,20 @@ def bookcase(shop: Workshop) -> list[Piece]:
     width, height = shop.between(0.5, 1.3), shop.between(0.8, 2.0)
     carcass = Carcass(width, 0, height, shop.between(0.25, 0.38), shop.between(0.02, 0.04), shop.chance(0.7))
     columns = shop.pick(*range(1, 1 + max(1, min(3, int(width / 0.33)))))
-    return _stand(
-        shop, carcass, fronts.shelves(columns), shop.pick("none", "plinth", "feet", weights=(3, 2, 1))
-    )
+    return _stand(shop, carcass, fronts.shelves(columns), shop.weighted({"none": 3, "plinth": 2, "feet": 1}))
 
 
 def cabinet(shop: Workshop) -> list[Piece]:
     """Doors, one to four, with shelves behind them or drawers above them."""
     width, height = shop.between(0.4, 1.2), shop.between(0.55, 1.4)
     carcass = Carcass(width, 0, height, shop.between(0.32, 0.55), shop.between(0.02, 0.035))
-    fill = shop.pick(fronts.doors, fronts.doors_below_drawers, fronts.open_above_doors, weights=(3, 3, 2))
+    fill = shop.weighted({fronts.doors: 3, fronts.doors_below_drawers: 3, fronts.open_above_doors: 2})
     return _stand(shop, carcass, fill, shop.pick("none", "plinth", "feet", "legs", "casters", "frame"))
 
 
 def chest(shop: Workshop) -> list[Piece]:
     """Drawers in rows, also as a bedside chest or a dresser with a mirror."""
-    kind = shop.pick("chest", "bedside", "dresser", weights=(3, 2, 2))
+    kind = shop.weighted({"chest": 3, "bedside": 2, "dresser": 2})
     widths = {"chest": (0.6, 1.0), "bedside": (0.38, 0.55), "dresser": (1.0, 1.5)}
     heights = {"chest": (0.75, 1.3), "bedside": (0.4, 0.65), "dresser": (0.65, 0.9)}
     carcass = Carcass(
@@ -135,12 +134,10 @@ def hutch(shop: Workshop) -> list[Piece]:
 
 def ladder(shop: Workshop) -> list[Piece]:
     """Shelves between two leaning side bars and two upright ones."""
-    width, height, depth, thick = (
-        shop.between(0.5, 0.8),
-        shop.between(1.2, 1.8),
-        shop.between(0.35, 0.5),
-        0.035,
-    )
+    width = shop.between(0.5, 0.8)
+    height = shop.between(1.2, 1.8)
+    depth = shop.between(0.35, 0.5)
+    thick = 0.035
     x, z, top_z = width / 2, depth / 2, shop.between(0.1, 0.2)
     leaning = shop.beam(
         "frame_vertical_bar", (x - thick / 2, 0, z), (x - thick / 2, height, top_z - z), (thick, thick)

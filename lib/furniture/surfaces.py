@@ -25,16 +25,9 @@ from lib.extractor.partgraph import Part, PartGraph
 SIDES = 24  # corners of a section
 ROUND, SQUARE = 2.0, 40.0  # exponents
 POSTS = {
-    *(
-        "leg",
-        "foot",
-        "central_support",
-        "caster_stem",
-        "bar_stretcher",
-        "arm_near_vertical_bar",
-        "frame_vertical_bar",
-    ),
-    *("back_frame_vertical_bar", "back_surface_vertical_bar", "back_connector", "head_connector", "lever"),
+    *("leg", "foot", "central_support", "caster_stem", "bar_stretcher", "lever", "frame_vertical_bar"),
+    *("back_frame_vertical_bar", "back_surface_vertical_bar", "arm_near_vertical_bar"),
+    *("back_connector", "head_connector"),
 }
 SOFT = {"seat_single_surface", "headrest", "arm_sofa_style", "arm_horizontal_bar"}
 PLATES = {"pedestal", "board", "glass", "arm_writing_table", "countertop"}
@@ -69,9 +62,8 @@ def sweep(along: int, exponent: float, profile: tuple, bend: float = 0.0, bent: 
         rings[..., bent] += bend * (2 * share[:, None] - 1) ** 2
     vertices = np.concatenate([rings.reshape(-1, 3), rings[[0, -1]].mean(axis=1)])
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    return trimesh.Trimesh(
-        (vertices - low) / (high - low), _tube(len(share), reverse=along == 1), process=False
-    )
+    faces = _tube(len(share), reverse=along == 1)  # the two other axes, x and z, are a left-handed pair then
+    return trimesh.Trimesh((vertices - low) / (high - low), faces, process=False)
 
 
 def resampled(profile: tuple) -> list[tuple[float, float]]:
@@ -96,9 +88,7 @@ def _tube(rings: int, reverse: bool) -> np.ndarray:
     caps = [np.stack([beside, here, np.full(SIDES, first)], 1)]
     caps.append(np.stack([top + here, top + beside, np.full(SIDES, last)], 1))
     triangles = np.concatenate([*walls, *caps])
-    return (
-        triangles[:, ::-1] if reverse else triangles
-    )  # (z, x) is a left-handed pair of axes when listed as x, z
+    return triangles[:, ::-1] if reverse else triangles
 
 
 def unit_mesh(label: str, size: np.ndarray, style: int = 0) -> trimesh.Trimesh:

@@ -14,7 +14,7 @@ def corner_legs(shop: Workshop, frame, splay: float = 0.0) -> tuple[Leg, Leg]:
 
 def legs(shop: Workshop, frame) -> list[Piece]:
     """Four or six legs, straight or splayed, with or without stretchers and casters."""
-    splay = shop.pick(0.0, shop.between(0.02, 0.1), weights=(2, 1))
+    splay = shop.weighted({0.0: 2, shop.between(0.02, 0.1): 1})
     if splay:
         frame.overhang += splay * shop.between(0.5, 1)
     front, back = corner_legs(shop, frame, splay)
@@ -24,7 +24,7 @@ def legs(shop: Workshop, frame) -> list[Piece]:
     if frame.width > 1.6 and shop.chance(0.2):
         middle = Leg((0, 0, front.foot[2]), (0, frame.under, front.top[2]), front.thick).build(shop)
         return pieces + shop.row(middle, (0, 0, -front.foot[2] - front.top[2]), 2)
-    style = shop.pick("none", "sides", "H", "box", "front and back", "X", weights=(6, 1, 2, 1.5, 1, 1))
+    style = shop.weighted({"none": 6, "sides": 1, "H": 2, "box": 1.5, "front and back": 1, "X": 1})
     return pieces + stretchers(shop, style, front, back)
 
 
@@ -61,13 +61,10 @@ def trestle(shop: Workshop, frame) -> list[Piece]:
     end = [shop.block("foot", sides, (0, high), (-deep, deep))]
     beam = high if shop.chance(0.6) else 0.0
     if beam:
-        end.append(
-            shop.block("bar_stretcher", sides, (frame.under - high, frame.under), (-deep * 0.9, deep * 0.9))
-        )
-    column_z = shop.pick(0.0, deep * 0.45)
-    column = shop.block(
-        "leg", sides, (high, frame.under - beam), (column_z - thick / 2 - 0.02, column_z + thick / 2 + 0.02)
-    )
+        y = (frame.under - beam, frame.under)
+        end.append(shop.block("bar_stretcher", sides, y, (-deep * 0.9, deep * 0.9)))
+    column_z, half = shop.pick(0.0, deep * 0.45), thick / 2 + 0.02
+    column = shop.block("leg", sides, (high, frame.under - beam), (column_z - half, column_z + half))
     end += [column] if not column_z else [column, shop.copy(column, (0, 0, -2 * column_z))]
     pieces = shop.both(group("leg", *end)) if shop.chance(0.5) else shop.both(*end)
     y = frame.under * shop.between(0.2, 0.75)
@@ -83,8 +80,7 @@ def crossed(shop: Workshop, frame) -> list[Piece]:
     x, deep, thick = frame.base[0] * shop.between(0.7, 0.95), frame.base[1] * 0.9, shop.between(0.03, 0.06)
     outer = shop.beam("leg", (x, 0.01, -deep), (x, frame.under, deep), (thick, thick))
     inner = shop.beam("leg", (x - thick, 0.01, deep), (x - thick, frame.under, -deep), (thick, thick))
-    y, half = frame.under / 2, x - thick * 1.4
-    bar = shop.block("bar_stretcher", (-half, half), (y - 0.02, y + 0.02), (-0.02, 0.02))
+    bar = shop.crossbar("bar_stretcher", x - 1.4 * thick, frame.under / 2, 0.0, 0.04)
     return [*shop.both(outer, inner), bar]
 
 
@@ -129,21 +125,17 @@ def panels(shop: Workshop, frame) -> list[Piece]:
     """Solid sides, with or without a back, a shelf and a divider."""
     (x, z), thick = frame.base, shop.between(0.022, 0.05)
     pieces = shop.both(shop.block("vertical_side_panel", (x - thick, x), (0, frame.under), (-z, z)))
-    inner = x - thick
+    inner, shelved = x - thick, shop.chance(0.4)
     if shop.chance(0.6):
         low = frame.under * shop.pick(0.0, shop.between(0.2, 0.6))
-        place = shop.pick(-z, -0.01)
+        place = -z if shelved else shop.pick(-z, -0.01)
         pieces.append(shop.block("back_panel", (-inner, inner), (low, frame.under), (place, place + 0.022)))
-    if shop.chance(0.4):
-        y = frame.under * shop.between(0.1, 0.5)
-        pieces.append(
-            shop.block("shelf", (-inner, inner), (y, y + 0.022), (-z + 0.025, z * shop.between(0.5, 1)))
-        )
+    if shelved:
+        y, deep = frame.under * shop.between(0.1, 0.5), (0.022 - z, z * shop.between(0.5, 1))
+        pieces.append(shop.block("shelf", (-inner, inner), (y, y + 0.022), deep))
         if shop.chance(0.4):
             pieces.append(
-                shop.block(
-                    "vertical_divider_panel", (-0.011, 0.011), (y + 0.022, frame.under), (-z + 0.025, z * 0.5)
-                )
+                shop.block("vertical_divider_panel", (-0.011, 0.011), (y + 0.022, frame.under), deep)
             )
     return pieces
 

@@ -34,8 +34,10 @@ class Frame:
 
 def table(workshop: Workshop) -> Piece:
     """One table of a kind drawn at random."""
-    kind = workshop.pick(dining, coffee, side, console, desk, weights=(28, 22, 18, 10, 24))
+    kind = workshop.weighted({dining: 28, coffee: 22, side: 18, console: 10, desk: 24})
     frame, top, base = kind(workshop)
+    if base is desks.drawer_box and top in (planks, slab_on_apron):
+        top = slab  # an apron would hide the drawers
     frame.central = base in bases.CENTRAL
     if frame.central and base is not bases.two_pedestals:
         frame.width = min(frame.width, 1.3 * frame.depth)
@@ -48,23 +50,20 @@ def table(workshop: Workshop) -> Piece:
 def dining(shop: Workshop):
     """A table to sit at."""
     width = shop.between(0.9, 2.0)
-    depth = (
-        shop.pick(shop.between(0.75, 1.0), width, weights=(3, 1)) if width < 1.4 else shop.between(0.75, 1.0)
-    )
+    depth = shop.weighted({shop.between(0.75, 1.0): 3, width: 1}) if width < 1.4 else shop.between(0.75, 1.0)
     frame = Frame(
         width, min(depth, width), shop.between(0.7, 0.78), shop.between(0.025, 0.06), shop.between(0.0, 0.12)
     )
-    base = shop.pick(
-        *(
-            bases.legs,
-            bases.trestle,
-            bases.pedestal,
-            bases.two_pedestals,
-            bases.crossed,
-            bases.panels,
-            bases.frames,
-        ),
-        weights=(8, 3, 3, 1.5, 1.5, 1.5, 1.5),
+    base = shop.weighted(
+        {
+            bases.legs: 8,
+            bases.trestle: 3,
+            bases.pedestal: 3,
+            bases.two_pedestals: 1.5,
+            bases.crossed: 1.5,
+            bases.panels: 1.5,
+            bases.frames: 1.5,
+        }
     )
     return frame, shop.pick(slab, planks, framed, glass, leaves, slab_on_apron), base
 
@@ -74,17 +73,16 @@ def coffee(shop: Workshop):
     width = shop.between(0.7, 1.3)
     depth = shop.pick(width * shop.between(0.45, 0.7), width)
     frame = Frame(width, depth, shop.between(0.3, 0.48), shop.between(0.025, 0.08), shop.between(0.0, 0.08))
-    base = shop.pick(
-        *(
-            bases.legs,
-            bases.shelf_legs,
-            bases.pedestal,
-            bases.crossed,
-            bases.panels,
-            bases.frames,
-            bases.cube,
-        ),
-        weights=(4, 4, 1.5, 1, 2, 2, 1),
+    base = shop.weighted(
+        {
+            bases.legs: 4,
+            bases.shelf_legs: 4,
+            bases.pedestal: 1.5,
+            bases.crossed: 1,
+            bases.panels: 2,
+            bases.frames: 2,
+            bases.cube: 1,
+        }
     )
     return frame, shop.pick(slab, planks, framed, glass, glass, slab_on_apron), base
 
@@ -99,17 +97,16 @@ def side(shop: Workshop):
         shop.between(0.02, 0.045),
     )
     frame.overhang = shop.between(0.0, 0.05)
-    base = shop.pick(
-        *(
-            bases.legs,
-            bases.shelf_legs,
-            bases.pedestal,
-            bases.tripod,
-            desks.drawer_box,
-            bases.c_frame,
-            bases.panels,
-        ),
-        weights=(3, 3, 3, 1.5, 2, 1, 1),
+    base = shop.weighted(
+        {
+            bases.legs: 3,
+            bases.shelf_legs: 3,
+            bases.pedestal: 3,
+            bases.tripod: 1.5,
+            desks.drawer_box: 2,
+            bases.c_frame: 1,
+            bases.panels: 1,
+        }
     )
     return frame, shop.pick(slab, slab, framed, glass, slab_on_apron), base
 
@@ -140,16 +137,15 @@ def desk(shop: Workshop):
         shop.between(0.025, 0.05),
         shop.between(0, 0.04),
     )
-    base = shop.pick(
-        *(
-            desks.drawer_towers,
-            desks.one_tower,
-            desks.drawer_box,
-            bases.panels,
-            bases.frames,
-            desks.keyboard_desk,
-        ),
-        weights=(4, 4, 3, 2, 2, 1.5),
+    base = shop.weighted(
+        {
+            desks.drawer_towers: 4,
+            desks.one_tower: 4,
+            desks.drawer_box: 3,
+            bases.panels: 2,
+            bases.frames: 2,
+            desks.keyboard_desk: 1.5,
+        }
     )
     return frame, shop.pick(slab, slab, slab, framed, slab_with_riser), base
 

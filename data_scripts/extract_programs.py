@@ -51,7 +51,7 @@ without them:
       python -m data_scripts.make_furniture --category chair --count 500
       python -m data_scripts.extract_programs data/furniture/chair --out data/extracted/chair
 on a cluster:
-  pip install "shape-programs[cluster]", then --scheduler tcp://HOST:8786 of a running Dask cluster whose workers
+  pip install -e '.[cluster]', then --scheduler tcp://HOST:8786 of a running Dask cluster whose workers
   have this repository installed and see INPUT under the same path.
 """
 
@@ -113,9 +113,9 @@ def workers(count: int, scheduler: str | None) -> Iterator[None]:
 @contextmanager
 def _cluster(scheduler: str) -> Iterator[None]:
     try:
-        from distributed import Client, KilledWorker  # optional: pip install "shape-programs[cluster]"
+        from distributed import Client, KilledWorker  # optional: pip install -e '.[cluster]'
     except ImportError as error:
-        raise DataError(f'--scheduler needs Dask: pip install "shape-programs[cluster]" ({error})') from error
+        raise DataError(f"--scheduler needs Dask: pip install -e '.[cluster]' ({error})") from error
     try:
         client = Client(scheduler, timeout=10)
     except (OSError, ValueError) as error:

@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 IN_SMALL_CHUNKS = """
 import sys
 from data_scripts import extract_programs
-extract_programs.CHUNK = 2
+extract_programs.CHUNK, extract_programs.CODE = 2, ()
 sys.exit(extract_programs.main(sys.argv[1:]))
 """
 TIDY = Extraction(parse("Assembly Program_0 {\n\tbbox = Cuboid(1, 1, 1, True)\n}\n"), f_score=99.999)
@@ -40,9 +40,13 @@ def unchecked_annotations():
     config.update("jaxtyping_disable", before)
 
 
-@pytest.fixture(autouse=True)
-def small_chunks(monkeypatch):
-    monkeypatch.setattr(extract_programs, "CHUNK", 2)
+@pytest.fixture(autouse=True, scope="module")
+def small_chunks():
+    """Several chunks from a few files; and lib may change while the tests run."""
+    before = extract_programs.CHUNK, extract_programs.CODE
+    extract_programs.CHUNK, extract_programs.CODE = 2, ()
+    yield
+    extract_programs.CHUNK, extract_programs.CODE = before
 
 
 @pytest.fixture
@@ -78,11 +82,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 def extracted(source: Path, out: Path, *more: str) -> dict[str, bytes]:
     """Run in this process; returns all files of the output."""
     where = [] if "--scheduler" in more or "--workers" in more else ["--workers", "1"]
-    before, extract_programs.CHUNK = extract_programs.CHUNK, 2
-    try:
-        assert extract_programs.main([str(source), "--out", str(out), *where, *more]) == 0
-    finally:
-        extract_programs.CHUNK = before
+    assert extract_programs.main([str(source), "--out", str(out), *where, *more]) == 0
     return contents(out)
 
 
@@ -116,9 +116,14 @@ def test_two_workers_make_the_same(furniture, reference, tmp_path):
     assert extracted(furniture, tmp_path / "out", "--workers", "2") == reference
 
 
-def test_an_archive_makes_the_same(furniture, reference, tmp_path):
+def test_an_archive_makes_the_same(furniture, tmp_path, quick):
     archive = shutil.make_archive(str(tmp_path / "all"), "zip", furniture)
-    assert extracted(Path(archive), tmp_path / "out") == reference
+    (furniture / "chair" / "broken.json").write_text("{")
+    with zipfile.ZipFile(archive, "a") as more:
+        more.writestr("chair/broken.json", "{")
+    from_folder = extracted(furniture, tmp_path / "folder")
+    (furniture / "chair" / "broken.json").unlink()
+    assert extracted(Path(archive), tmp_path / "zip") == from_folder
 
 
 def test_a_killed_run_goes_on_to_the_same_end(furniture, reference, tmp_path, capsys):
@@ -178,7 +183,7 @@ def test_no_cluster_there(furniture, tmp_path, capsys, monkeypatch):
     assert "no Dask scheduler answers at nonsense://here" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "distributed", None)  # as if it were not installed
     assert extract_programs.main(command) == 1
-    assert 'pip install "shape-programs[cluster]"' in capsys.readouterr().err
+    assert "pip install -e '.[cluster]'" in capsys.readouterr().err
 
 
 def test_poisoned_files_stop_nothing(furniture, tmp_path):
@@ -249,6 +254,11 @@ def changed_setting(source, out):
     return ["--keep-rejected"], "keep_rejected: 'False' then, 'True' now"
 
 
+def changed_code(source, out):
+    extract_programs.CODE = ("metrics",)
+    return [], "code: '.*' then, '.*' now"
+
+
 def changed_file(source, out):
     path = source / "chair" / "chair-000003.json"
     path.write_bytes(path.read_bytes().replace(b"0.1", b"0.2"))
@@ -271,9 +281,10 @@ def lost_journal(source, out):
 
 
 @pytest.mark.parametrize(
-    "change", [changed_setting, changed_file, removed_file, damaged_journal, lost_journal]
+    "change", [changed_setting, changed_code, changed_file, removed_file, damaged_journal, lost_journal]
 )
-def test_two_runs_are_never_mixed(furniture, tmp_path, quick, capsys, change):
+def test_two_runs_are_never_mixed(furniture, tmp_path, quick, capsys, change, monkeypatch):
+    monkeypatch.setattr(extract_programs, "CODE", ())
     source, out = tmp_path / "in", tmp_path / "out"
     shutil.copytree(furniture, source)
     extracted(source, out)

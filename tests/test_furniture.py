@@ -179,7 +179,7 @@ def test_boxes_are_sound(many, category):
         assert torch.equal(root.axes, torch.eye(3).double()) and root.center.abs().max() < 1e-12
         torch.testing.assert_close(boxes.bounds(), torch.stack([-root.size / 2, root.size / 2]))
         assert 1.5 <= diagonal_of(graph) <= 2
-    assert tilted > 20  # slanted parts are a trouble worth having
+    assert tilted >= 8  # slanted parts are a trouble worth having
 
 
 @pytest.mark.parametrize("category", CATEGORIES)

@@ -1,15 +1,22 @@
 """From a shape's parts to the program that makes it (ShapeAssembly paper, section 5 and Appendix C).
 
-    graph = PartGraph.read("43875.json", category="chair")
-    extraction = extract(graph)            extract_many(graphs) for many
-    extraction.program                     a canonical, validated ShapeAssembly program
-    extraction.reason                      or why there is none
+graph = PartGraph.read("43875.json", category="chair")
+extraction = extract(graph)            extract_many(graphs) for many
+extraction.program                     a canonical, validated ShapeAssembly program
+extraction.reason                      or why there is none
+
+stages(graph)                          the part graph after each step of rearranging it
+survey(regularise(graph).root, …)      what is found out about each block: contacts, groups, order
 """
 
-from .errors import PartGraphError, RejectedError
-from .extracting import Extraction, Options, extract, extract_many, stages
+from .errors import PartGraphError, PartGraphWarning, RejectedError
+from .extracting import Extraction, Options, extract, extract_many, regularise, stages, survey
+from .facts import BlockFacts, Group
+from .files import load, read_many, sources
 from .partgraph import Part, PartGraph
+from .validating import REASONS
 
 __all__ = [
-    "Extraction", "Options", "Part", "PartGraph", "PartGraphError", "RejectedError", "extract", "extract_many", "stages",
+    "REASONS", "BlockFacts", "Extraction", "Group", "Options", "Part", "PartGraph", "PartGraphError", "PartGraphWarning",
+    "RejectedError", "extract", "extract_many", "load", "read_many", "regularise", "sources", "stages", "survey",
 ]  # fmt: skip

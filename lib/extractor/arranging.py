@@ -11,8 +11,8 @@ Hierarchy Arrangement"). Boxes stay as they are; only who is whose child changes
 
 from dataclasses import replace
 
-from .labels import COLLAPSED, FLATTENED, FRAME, HELD_BY_FRAME
 from .errors import RejectedError
+from .labels import COLLAPSED, FLATTENED, FRAME, HELD_BY_FRAME
 from .partgraph import Part, PartGraph
 
 SLIVER = 0.004  # thinner than this share of the shape's longest side: PartNet's fringe (the authors: 0.01 of about 1)

@@ -18,7 +18,6 @@ from ..interpreters.cuboids import Cuboids
 from .partgraph import Part, PartGraph, stack
 from .snapping import UPRIGHT, rename_axes, turning_axis
 
-
 LEANING = 0.5  # how vertical (cosine) the axis of a turn may be to count as leaning
 
 
@@ -57,9 +56,13 @@ def enclosing_box(boxes: Cuboids) -> Cuboids:
 def _common_axes(boxes: Cuboids) -> Float[Tensor, "3 3"]:
     upright = torch.eye(3, dtype=torch.float64)
     axes = torch.cat([upright[None], boxes.axes])
-    seen = (boxes.axes.unsqueeze(0) @ axes.mT.unsqueeze(1)).abs().amax(-1)  # how straight each box is in each frame
+    seen = (
+        (boxes.axes.unsqueeze(0) @ axes.mT.unsqueeze(1)).abs().amax(-1)
+    )  # how straight each box is in each frame
     leaning = turning_axis(rename_axes(boxes).axes)[:, 1].abs() < LEANING
-    alike = (seen >= UPRIGHT).all(-1).sum(-1) * torch.cat([torch.ones(1, dtype=torch.bool), leaning])  # (n + 1)
+    alike = (seen >= UPRIGHT).all(-1).sum(-1) * torch.cat(
+        [torch.ones(1, dtype=torch.bool), leaning]
+    )  # (n + 1)
     best = int(alike.argmax())  # the first of equals: upright before turned
     return axes[best] if 2 * alike[best] > len(boxes) else upright
 

@@ -25,7 +25,9 @@ from .snapping import UPRIGHT
 REACH = 0.02  # share of the longest side of the two boxes: how far apart they may be
 BBOX_REACH = 0.05  # share of the block's height: how far from its top or bottom a cuboid may end
 WIDER = (1, 2, 4)  # times the reach, tried in turn while a block falls apart
-AS_NEAR = 0.1  # share of the reach by which a preferred place may miss the other box more than the middle does
+AS_NEAR = (
+    0.1  # share of the reach by which a preferred place may miss the other box more than the middle does
+)
 BOTTOM, TOP = -2, -1  # the bounding box's faces, as partners
 
 # local coordinates of the centers of the faces left, right, bottom, top, back, front
@@ -84,7 +86,9 @@ def floating(count: int, contacts, holds: dict[int, frozenset[int]] | None = Non
             i
             for c in contacts
             for i in (c.first, c.second)
-            if i not in standing and c.partner(i) in standing and c.partner(i) in holds.get(i, (c.partner(i),))
+            if i not in standing
+            and c.partner(i) in standing
+            and c.partner(i) in holds.get(i, (c.partner(i),))
         }
         standing |= found
     return set(range(count)) - standing
@@ -107,7 +111,9 @@ def find_contacts(
     a, b = all_boxes[first], all_boxes[second]
     point, kind = _touching_points(a, b, grow)
     at_a, at_b = a.local(point).clamp(0, 1), b.local(point).clamp(0, 1)
-    bbox = Cuboids(size.expand(len(first), 3), torch.zeros_like(a.center), torch.eye(3).double().expand_as(a.axes))
+    bbox = Cuboids(
+        size.expand(len(first), 3), torch.zeros_like(a.center), torch.eye(3).double().expand_as(a.axes)
+    )
     at_b = torch.where((second >= count)[:, None], bbox.local(point).clamp(0, 1), at_b)
     partner = torch.where(second >= count, second - count - 2, second)
     rows = zip(first.tolist(), partner.tolist(), at_a.tolist(), at_b.tolist(), kind.tolist(), point.tolist())
@@ -163,8 +169,12 @@ def meet(a: Cuboids, b: Cuboids) -> Bool[Tensor, " n"]:
 def _touching_points(a: Cuboids, b: Cuboids, grow: Float[Tensor, " n"]) -> tuple[Tensor, Tensor]:
     """For each touching pair the place (n, 3) in the block's frame, and its kind (n)."""
     middle = shared_middle(grown(a, grow), grown(b, grow))
-    points = torch.cat([a.world_many(FACE_CENTERS), b.world_many(FACE_CENTERS), middle.unsqueeze(1)], 1)  # (n, 13, 3)
-    kind = torch.cat([_face_to(a, b, 2 * grow), _face_to(b, a, 2 * grow), torch.full((len(grow), 1), MIDDLE)], 1)
+    points = torch.cat(
+        [a.world_many(FACE_CENTERS), b.world_many(FACE_CENTERS), middle.unsqueeze(1)], 1
+    )  # (n, 13, 3)
+    kind = torch.cat(
+        [_face_to(a, b, 2 * grow), _face_to(b, a, 2 * grow), torch.full((len(grow), 1), MIDDLE)], 1
+    )
     # Where boxes miss each other every place moves a little when it is brought into both; none should move more.
     moves = (_into(a, points) - _into(b, points)).norm(dim=-1)
     kind = torch.where(moves <= moves[:, -1:] + AS_NEAR * 2 * grow.unsqueeze(-1), kind, 9)

@@ -1,6 +1,6 @@
 """The whole way from a part graph to a program: the stages in their order, and what comes out.
 
-    graph --regularise--> graph --survey--> facts about every block --write_program--> program --validate--> accepted?
+graph --regularise--> graph --survey--> facts about every block --write_program--> program --validate--> accepted?
 """
 
 from collections.abc import Sequence
@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import torch
 
 from ..interpreters.shapeassembly import Program, ProgramError, execute_many
-from .arranging import collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers, LEVELS
+from .arranging import LEVELS, collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers
 from .bounding import refit, seen_from
 from .contacts import connecting_contacts, mark_firm
 from .errors import RejectedError
+from .facts import BlockFacts
 from .labels import RANKED
 from .ordering import grounded_order
 from .partgraph import Part, PartGraph, stack
@@ -22,7 +23,6 @@ from .snapping import is_upright, rename_axes, snap, snap_leaves
 from .subprograms import join_components
 from .symmetry import find_groups, open_ways
 from .validating import check_program, judge_shape
-from .facts import BlockFacts
 from .writing import write_program
 
 
@@ -61,7 +61,17 @@ class Extraction:
 
 def stages(graph: PartGraph, options: Options = Options()) -> list[tuple[str, PartGraph]]:
     """The part graph after each step of rearranging it, by name, the input first: for looking at."""
-    steps = [without_slivers, collapse, flatten, hold, snap_leaves, shorten, shorten_chains, limit_levels, refit]
+    steps = [
+        without_slivers,
+        collapse,
+        flatten,
+        hold,
+        snap_leaves,
+        shorten,
+        shorten_chains,
+        limit_levels,
+        refit,
+    ]
     if not options.hierarchy:
         steps.insert(steps.index(hold) + 1, flat)
     graphs = [("input", graph), ("in_order", in_order(graph))]
@@ -112,7 +122,9 @@ def survey(node: Part, category: str, options: Options = Options(), level: int =
         facts = replace(facts, groups=tuple(find_groups(facts)))
     facts = replace(facts, ways=tuple(ordered_ways(facts)))
     inner = {
-        i: survey(facts.parts[i], category, options, level + 1) for i in facts.written if facts.parts[i].children
+        i: survey(facts.parts[i], category, options, level + 1)
+        for i in facts.written
+        if facts.parts[i].children
     }
     return replace(facts, inner=inner)
 
@@ -138,7 +150,9 @@ def judged_ways(facts: BlockFacts, options: Options) -> list[Way]:
     ways = [
         way
         for i, upright in enumerate(facts.aligned.tolist())
-        for way in ways_to_place(i, list(facts.contacts), facts.boxes, facts.size, not upright, options.macros)
+        for way in ways_to_place(
+            i, list(facts.contacts), facts.boxes, facts.size, not upright, options.macros
+        )
     ]
     misfits = judge(ways, facts.boxes, facts.aligned, facts.size).tolist()
     return [replace(way, misfit=misfit) for way, misfit in zip(ways, misfits)]

@@ -10,7 +10,9 @@ from .contacts import Contact
 from .partgraph import Part
 from .placing import Way
 
-AS_GOOD = 0.004  # misfits that differ by less than this share of the block's diagonal are as good as each other
+AS_GOOD = (
+    0.004  # misfits that differ by less than this share of the block's diagonal are as good as each other
+)
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,15 @@ def grounded_order(
 def _preference(way: Way, tolerance: float, aligned: list[bool]) -> tuple:
     """What is better comes first: fit, a macro, more connections, then the paper's ties."""
     on_tilted = tuple(partner >= 0 and not aligned[partner] for partner in way.partners)
-    return (way.steps(tolerance), not way.face, -len(way.partners), way.partners, on_tilted, way.kinds, way.points)
+    return (
+        way.steps(tolerance),
+        not way.face,
+        -len(way.partners),
+        way.partners,
+        on_tilted,
+        way.kinds,
+        way.points,
+    )
 
 
 def _loss(key: tuple, best: tuple) -> tuple:

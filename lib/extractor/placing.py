@@ -16,15 +16,19 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from ..interpreters.cuboids import Cuboids, concatenate
-from ..interpreters.shapeassembly.attaching import choose, move, stretch_and_turn
+from ..interpreters.shapeassembly.attaching import move, stretch_and_turn
 from ..interpreters.shapeassembly.growing import grow
 from ..interpreters.shapeassembly.program import FACES
 from .contacts import BOTTOM, MIDDLE, TOP, Contact
 from .snapping import turning_axis
 
 DIGITS = 3  # decimals of local coordinates in the text, as in the authors' data set
-AT_CENTER = 0.05  # how far (L1, local) a contact may be from a face's center for a squeeze (the authors' program)
-SAME_PLACE = 0.15  # how far (L1, local) the (u, v) of a squeeze's two partners may differ (the authors' program)
+AT_CENTER = (
+    0.05  # how far (L1, local) a contact may be from a face's center for a squeeze (the authors' program)
+)
+SAME_PLACE = (
+    0.15  # how far (L1, local) the (u, v) of a squeeze's two partners may differ (the authors' program)
+)
 APART = 0.1  # how far apart (L1, local) two contacts must be on a cuboid to be two (the authors' program)
 
 # face name -> (axis, side) in local coordinates
@@ -49,7 +53,12 @@ class Way:
 
 
 def ways_to_place(
-    cuboid: int, contacts: list[Contact], boxes: Cuboids, size: Float[Tensor, "3"], tilted: bool, squeezes: bool = True
+    cuboid: int,
+    contacts: list[Contact],
+    boxes: Cuboids,
+    size: Float[Tensor, "3"],
+    tilted: bool,
+    squeezes: bool = True,
 ) -> list[Way]:
     """Every way to hold `cuboid` by its contacts, not yet judged.
 
@@ -142,7 +151,9 @@ def squeeze_points(face: str, first: int, second: int, at: Point) -> tuple[tuple
     return end(side, first), end(1 - side, second)
 
 
-def judge(ways: list[Way], boxes: Cuboids, aligned: Bool[Tensor, " n"], size: Float[Tensor, "3"]) -> Float[Tensor, " w"]:
+def judge(
+    ways: list[Way], boxes: Cuboids, aligned: Bool[Tensor, " n"], size: Float[Tensor, "3"]
+) -> Float[Tensor, " w"]:
     """How far each way leaves the farthest corner of its cuboid from where it should be, in block units."""
     if not ways:
         return torch.zeros(0, dtype=torch.float64)
@@ -153,7 +164,9 @@ def judge(ways: list[Way], boxes: Cuboids, aligned: Bool[Tensor, " n"], size: Fl
     points = torch.tensor([way.points[0] + way.points[-1] for way in ways], dtype=torch.float64)  # (w, 4, 3)
     first, second = (torch.where(p < 0, len(boxes), p) for p in (first, second))
     target, straight = boxes[cuboid], aligned[cuboid]
-    start = Cuboids(target.size, torch.zeros_like(target.center), torch.eye(3).double().expand_as(target.axes))
+    start = Cuboids(
+        target.size, torch.zeros_like(target.center), torch.eye(3).double().expand_as(target.axes)
+    )
     fixed = partners[first].world(points[:, 1])
     held = move(start, points[:, 0], fixed)
     twice = torch.tensor([len(way.partners) == 2 for way in ways])

@@ -71,7 +71,9 @@ def _cuts(boxes: Cuboids, others: Cuboids, same: bool = True) -> Float[Tensor, "
     inward = boxes.axes * boxes.size.unsqueeze(-1)  # (n, axis, 3): all the way to the opposite face
     inward = inward[:, axis] * (1 - 2 * (torch.arange(6) % 2)).view(1, 6, 1)
     offset = corners.unsqueeze(1) - others.center.view(1, -1, 1, 3)  # (n, m, 24, 3)
-    q = torch.einsum("nmck,mik->nmci", offset, others.axes) / others.size.view(1, -1, 1, 3)  # -1/2 to 1/2 inside
+    q = torch.einsum("nmck,mik->nmci", offset, others.axes) / others.size.view(
+        1, -1, 1, 3
+    )  # -1/2 to 1/2 inside
     step = torch.einsum("nfk,mik->nmfi", inward, others.axes) / others.size.view(1, -1, 1, 3)
     q, step = q.unflatten(2, (6, 4)), step.unsqueeze(3)  # (n, m, face, corner, 3), (n, m, face, 1, 3)
     inside = (q.abs() <= 0.5 + INSIDE).all(-1).all(-1)  # (n, m, face)

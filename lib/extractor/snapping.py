@@ -58,7 +58,10 @@ def turning_axis(axes: Float[Tensor, "*n 3 3"]) -> Float[Tensor, "*n 3"]:
 def is_upright(boxes: Cuboids) -> Bool[Tensor, " n"]:
     """Which boxes, their axes renamed, count as standing upright in their frame."""
     straight = torch.diagonal(boxes.axes, dim1=-2, dim2=-1) >= UPRIGHT
-    first, second = boxes.size[:, [1, 2, 0]], boxes.size[:, [2, 0, 1]]  # the cross-section across axis 0, 1, 2
+    first, second = (
+        boxes.size[:, [1, 2, 0]],
+        boxes.size[:, [2, 0, 1]],
+    )  # the cross-section across axis 0, 1, 2
     thicker = torch.maximum(first, second)
     square_bar = ((first - second).abs() < SQUARE * thicker) & (thicker < THIN * boxes.size)
     return straight.all(-1) | (square_bar & straight).any(-1)

@@ -5,14 +5,13 @@ connected components of parts that all have a mirror image do: each such compone
 a sub-program, which is then mirrored as a whole.
 """
 
-from dataclasses import replace
 
 import torch
 from scipy.sparse.csgraph import connected_components
 
 from ..interpreters.cuboids import Cuboids
 from .bounding import enclosing_box, part_leaves
-from .contacts import BOTTOM, TOP, Contact
+from .contacts import Contact
 from .partgraph import Part, stack
 from .symmetry import mirror_images
 
@@ -58,9 +57,7 @@ def _same_partners(component: list[int], pairs: dict[int, int], contacts: list[C
     if len(other) < len(half):
         return False
     touched = [
-        {c.partner(i) for c in contacts if c.firm for i in (c.first, c.second) if i in side}
-        - half
-        - other
+        {c.partner(i) for c in contacts if c.firm for i in (c.first, c.second) if i in side} - half - other
         for side in (half, other)
     ]
     return bool(touched[0]) and touched[0] == touched[1]

@@ -30,17 +30,21 @@ from .placing import Way, bounding_box
 ALIKE = 0.015  # share of the block's longest side: how far corners of a copy may lie from where they should
 UNEVEN = 0.1  # share of the spacing of a row: how far a member may be from its place (the authors' program)
 NEARLY_NOTHING = 1e-6  # world units
-SAME_POINT = 0.1  # the same for the places where copies touch other parts (the authors' program: 0.1 of about 1)
+SAME_POINT = (
+    0.1  # the same for the places where copies touch other parts (the authors' program: 0.1 of about 1)
+)
 
 
-def find_groups(facts: BlockFacts) -> list[Group]:
+def find_groups(facts: BlockFacts, alike: float = ALIKE) -> list[Group]:
     """Groups of a block's parts; `facts.ways` are all ways to hold them. No part is in two groups."""
     parts, boxes, size = facts.parts, facts.boxes, facts.size
-    mirrored = [mirror_images(parts, boxes, axis, size) for axis in range(3)]
-    rows = [row for axis in range(3) for row in find_rows(parts, boxes, axis, size)]
+    mirrored = [mirror_images(parts, boxes, axis, size, alike) for axis in range(3)]
+    rows = [row for axis in range(3) for row in find_rows(parts, boxes, axis, size, alike)]
     candidates = sorted((row for row in rows if len(row.members) > 2), key=lambda row: -len(row.members))
     candidates += [
-        Group("reflect", AXES[axis], (i, j)) for axis in range(3) for i, j in mirrored[axis].nonzero().tolist()
+        Group("reflect", AXES[axis], (i, j))
+        for axis in range(3)
+        for i, j in mirrored[axis].nonzero().tolist()
     ]
     candidates += [row for row in rows if len(row.members) == 2]
     touched = touched_parts(len(parts), facts.contacts)
@@ -81,7 +85,9 @@ def falling(facts: BlockFacts, groups: tuple[Group, ...]) -> set[int]:
 
 def worse(facts: BlockFacts, groups: tuple[Group, ...]) -> set[int]:
     """The parts that could no longer be held as well as without the groups, such as a bar that lost one of its ends."""
-    before, after = (_best_steps(ways, facts.tolerance) for ways in (facts.ways, open_ways(facts.ways, groups)))
+    before, after = (
+        _best_steps(ways, facts.tolerance) for ways in (facts.ways, open_ways(facts.ways, groups))
+    )
     return {part for part in after if after[part] > before[part]}
 
 
@@ -126,43 +132,51 @@ def into(facts: BlockFacts, partner: int, place: Float[Tensor, "3"]) -> Float[Te
     return box.world(box.local(place).clamp(0, 1))
 
 
-def mirror_images(parts: tuple[Part, ...], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> Bool[Tensor, "n n"]:
+def mirror_images(
+    parts: tuple[Part, ...], boxes: Cuboids, axis: int, size: Float[Tensor, "3"], alike: float = ALIKE
+) -> Bool[Tensor, "n n"]:
     """[i, j]: part j is what `reflect` makes of part i, and i is the one on the lower side."""
-    tolerance = ALIKE * float(size.max())
+    tolerance = alike * float(size.max())
     mirror = torch.ones(3, dtype=torch.float64)
     mirror[axis] = -1
     corners = boxes.corners()
-    alike = corner_gap(corners * mirror, corners) <= tolerance
+    images = corner_gap(corners * mirror, corners) <= tolerance
     lower = boxes.center[:, axis]
-    alike &= (lower[:, None] < -tolerance / 2) & (lower[None] > tolerance / 2)
-    for i, j in alike.nonzero().tolist():
-        alike[i, j] = same_inside(parts[i], parts[j], lambda c: c * mirror, tolerance, turned=True)
-    return alike
+    images &= (lower[:, None] < -tolerance / 2) & (lower[None] > tolerance / 2)
+    for i, j in images.nonzero().tolist():
+        images[i, j] = same_inside(parts[i], parts[j], lambda c: c * mirror, tolerance, turned=True)
+    return images
 
 
-def find_rows(parts: tuple[Part, ...], boxes: Cuboids, axis: int, size: Float[Tensor, "3"]) -> list[Group]:
-    """Evenly spaced rows of equal parts along an axis, the longest first where several overlap."""
-    tolerance = ALIKE * float(size.max())
+def find_rows(
+    parts: tuple[Part, ...], boxes: Cuboids, axis: int, size: Float[Tensor, "3"], alike: float = ALIKE
+) -> list[Group]:
+    """Evenly spaced rows of at least two equal parts along an axis."""
+    tolerance = alike * float(size.max())
     along = torch.zeros(3, dtype=torch.float64)
     along[axis] = 1
     corners = boxes.corners() - (boxes.center * along).unsqueeze(1)  # all moved to the middle of the axis
-    alike = corner_gap(corners, corners) <= tolerance
+    equal = (corner_gap(corners, corners) <= tolerance).tolist()
     position = boxes.center[:, axis].tolist()
-    rows, left = [], set(range(len(parts)))
-    for i in sorted(left, key=lambda k: position[k]):
-        if i not in left:
-            continue
-        shelf = [j for j in left if alike[i, j] and same_inside(parts[i], parts[j], _shift(parts[i], parts[j], along), tolerance)]
-        for run in even_runs(sorted(shelf, key=lambda k: position[k]), position, tolerance):
+    rows, left = [], sorted(range(len(parts)), key=lambda part: position[part])
+    while left:
+        first = left[0]
+        row = [
+            part
+            for part in left
+            if equal[first][part] and _shifted(parts[first], parts[part], along, tolerance)
+        ]
+        for run in even_runs(row, position, tolerance):
             distance = (position[run[-1]] - position[run[0]]) / float(size[axis])
             rows.append(Group("translate", AXES[axis], tuple(run), distance))
-        left -= set(shelf)
+        left = [part for part in left if part not in row]
     return rows
 
 
-def _shift(first: Part, second: Part, along: Tensor):
+def _shifted(first: Part, second: Part, along: Float[Tensor, "3"], tolerance: float) -> bool:
+    """Does `second` hold what `first` holds, moved along the axis?"""
     step = (second.box.center - first.box.center) * along
-    return lambda corners: corners + step
+    return same_inside(first, second, lambda corners: corners + step, tolerance)
 
 
 def even_runs(row: list[int], position: list[float], tolerance: float) -> list[list[int]]:

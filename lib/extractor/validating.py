@@ -1,9 +1,9 @@
 """Stage 12: is the program good enough to learn from? (paper, section 5.3, "Validating Programs")
 
-    reconstruction   F-score against the input of at least 75
-    semantics        one connected component a block (a block without one is never written: see `ordering`), every part
-                     grounded, nothing beyond the bounding volumes
-    complexity       at most 12 leaf cuboids declared (macros may make more)
+reconstruction   F-score against the input of at least 75
+semantics        one connected component a block (a block without one is never written: see `ordering`), every part
+                 grounded, nothing beyond the bounding volumes
+complexity       at most 12 leaf cuboids declared (macros may make more)
 """
 
 import torch
@@ -64,7 +64,9 @@ def sticking_out(shape: Shape) -> list[str]:
     beyond, around = torch.zeros(len(leaf), dtype=torch.bool), parents[leaf]
     while (around >= 0).any():
         within = shape.boxes[around.clamp(min=0)]
-        offset = torch.einsum("nck,nik->nci", shape.cuboids.corners() - within.center.unsqueeze(1), within.axes)
+        offset = torch.einsum(
+            "nck,nik->nci", shape.cuboids.corners() - within.center.unsqueeze(1), within.axes
+        )
         allowed = torch.maximum(STICKS_OUT * within.size, ALWAYS_ALLOWED * diagonal)
         out = (offset.abs() - within.size.unsqueeze(1) / 2 > allowed.unsqueeze(1)).any(-1).any(-1)
         beyond |= out & (around >= 0)

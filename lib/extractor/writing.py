@@ -45,7 +45,9 @@ def write_block(facts: BlockFacts, names: dict[int, str], digits: int) -> tuple:
     ]
     attachments = [statement for way in facts.ways for statement in attach_statements(way, partner_names)]
     order = {part: position for position, part in enumerate(facts.written)}
-    copies = [copy_statement(group, names) for group in sorted(facts.groups, key=lambda g: order[g.members[0]])]
+    copies = [
+        copy_statement(group, names) for group in sorted(facts.groups, key=lambda g: order[g.members[0]])
+    ]
     return (*cuboids, *attachments, *copies)
 
 

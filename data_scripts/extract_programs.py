@@ -16,10 +16,11 @@ import json
 import os
 import sys
 import time
+import warnings
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -134,28 +135,44 @@ def extract_all(options: argparse.Namespace) -> tuple[list[dict], int]:
     found = fingerprints(options.input, options.category)
     if not found:
         raise DataError(f"there are no .json files in {options.input}")
-    if (options.out / "programs").exists() and not (options.out / "journal.jsonl").exists():
-        raise DataError(f"{options.out} holds programs of something else; choose another --out")
-    journal = Journal(options.out / "journal.jsonl", settings(options))
-    journal.check(found)
-    for row in journal.rows.values():
-        keep_program(options.out, row)
-    names = list(found)
-    chunks = [{name: found[name] for name in names[k : k + CHUNK]} for k in range(0, len(names), CHUNK)]
-    chunks = [chunk for chunk in chunks if not journal.rows.keys() >= chunk.keys()]
+    journal = open_journal(options, found)
+    chunks = unfinished(found, journal)
     count = sum(map(len, chunks))
-    source = options.input.resolve()  # a worker may have another working folder
-    parent = None if options.scheduler else os.getpid()
     with tqdm(desc="extracting", unit=" shapes", total=len(found), initial=len(found) - count) as bar:
-        with workers(options.workers, options.scheduler):
-            jobs = (delayed(extract_chunk)(source, chunk, options.keep_rejected, parent) for chunk in chunks)
-            for rows in Parallel(return_as="generator_unordered", batch_size=1)(jobs):
-                journal.add(rows)
-                for row in rows:
-                    keep_program(options.out, row)
-                bar.update(len(rows))
+        for rows in extract_chunks(chunks, options):
+            journal.add(rows)
+            keep_programs(options.out, rows)
+            bar.update(len(rows))
     journal.finish()
     return list(journal.rows.values()), count
+
+
+def open_journal(options: argparse.Namespace, found: dict[str, str]) -> Journal:
+    """What is finished, and nothing that was made otherwise or from other files. Raises DataError."""
+    path = options.out / "journal.jsonl"
+    if (options.out / "programs").exists() and not path.exists():
+        raise DataError(f"{options.out} holds programs of something else; choose another --out")
+    journal = Journal(path, settings(options))
+    journal.check(found)
+    keep_programs(options.out, journal.rows.values())  # the kill may have come between the journal and these
+    return journal
+
+
+def unfinished(found: dict[str, str], journal: Journal) -> list[dict[str, str]]:
+    """Chunks, name -> fingerprint, of which a file is missing in the journal; they are cut as in the first run."""
+    names = list(found)
+    chunks = [{name: found[name] for name in names[k : k + CHUNK]} for k in range(0, len(names), CHUNK)]
+    return [chunk for chunk in chunks if not journal.rows.keys() >= chunk.keys()]
+
+
+def extract_chunks(chunks: list[dict[str, str]], options: argparse.Namespace) -> Iterator[list[dict]]:
+    """The rows of each chunk, whichever is ready first. Raises DataError when the workers cannot go on."""
+    source = options.input.resolve()  # a worker may have another working folder
+    parent = None if options.scheduler else os.getpid()
+    with warnings.catch_warnings(), workers(options.workers, options.scheduler):
+        warnings.filterwarnings("ignore", ".* tasks which were still being processed")  # joblib, at Ctrl-C
+        jobs = (delayed(extract_chunk)(source, chunk, options.keep_rejected, parent) for chunk in chunks)
+        yield from Parallel(return_as="generator_unordered", batch_size=1)(jobs)
 
 
 def settings(options: argparse.Namespace) -> dict[str, str]:
@@ -170,11 +187,12 @@ def settings(options: argparse.Namespace) -> dict[str, str]:
     }
 
 
-def keep_program(out: Path, row: dict) -> None:
-    """Write the row's program, if it has one, to its place."""
-    if row["program"] is not None:
-        folder = "programs" if row["accepted"] else "rejected"
-        write_whole(out / folder / f"{row['name']}.txt", row["program"].encode())
+def keep_programs(out: Path, rows: Iterable[dict]) -> None:
+    """Write the rows' programs, where they have one, to their places."""
+    for row in rows:
+        if row["program"] is not None:
+            folder = "programs" if row["accepted"] else "rejected"
+            write_whole(out / folder / f"{row['name']}.txt", row["program"].encode())
 
 
 def report(out: Path, rows: list[dict]) -> dict:

@@ -8,6 +8,7 @@ A squeeze (paper, section 4) needs contacts at the centers of two opposite faces
 partners. Its first attach decides where the cuboid stands; (u, v) of the second may differ a little.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -19,7 +20,8 @@ from ..interpreters.cuboids import Cuboids, concatenate
 from ..interpreters.shapeassembly.attaching import move, stretch_and_turn
 from ..interpreters.shapeassembly.growing import grow
 from ..interpreters.shapeassembly.program import FACES
-from .contacts import BOTTOM, MIDDLE, TOP, Contact
+from .contacts import BBOX_REACH, BOTTOM, MIDDLE, TOP, Contact
+from .partgraph import stack_boxes
 from .snapping import turning_axis
 
 DIGITS = 3  # decimals of local coordinates in the text, as in the authors' data set
@@ -52,52 +54,94 @@ class Way:
         return int(min(self.misfit / tolerance, 1e6))
 
 
+@dataclass(frozen=True)
+class End:
+    """A contact seen from the cuboid that is to be held: the partner, and where on both."""
+
+    partner: int
+    on_cuboid: Point
+    on_partner: Point
+    kind: int
+
+
 def ways_to_place(
     cuboid: int,
-    contacts: list[Contact],
+    contacts: Sequence[Contact],
     boxes: Cuboids,
     size: Float[Tensor, "3"],
     tilted: bool,
     squeezes: bool = True,
 ) -> list[Way]:
-    """Every way to hold `cuboid` by its contacts, not yet judged.
-
-    A tilted cuboid is turned by its second attach, by as little as possible; only a line of contacts that is normal
-    to the axis of its turn turns it right. So for such a cuboid the second place is also moved onto that normal.
-    """
+    """Every way to hold `cuboid` by its contacts, not yet judged."""
     ends = [
-        (c.partner(cuboid), _rounded(c.at(cuboid)), _rounded(c.at(c.partner(cuboid))), c.kind)
+        End(c.partner(cuboid), _rounded(c.at(cuboid)), _rounded(c.at(c.partner(cuboid))), c.kind)
         for c in contacts
         if cuboid in (c.first, c.second)
     ]
-    ways = [Way(cuboid, (p,), ((q, r),), (kind,)) for p, q, r, kind in ends]
-    turn = turning_axis(boxes.axes[cuboid]) if tilted else None
-    for (p1, q1, r1, kind1), (p2, q2, r2, kind2) in permutations(ends, 2):
-        if _distance(q1, q2) < APART:
-            continue
-        ways.append(Way(cuboid, (p1, p2), ((q1, r1), (q2, r2)), (kind1, kind2)))
-        if squeezes and (face := _squeezed_face((p1, q1, r1), (p2, q2, r2))):
-            ways.append(Way(cuboid, (p1, p2), squeeze_points(face, p1, p2, r1), (kind1, kind2), face))
-        if turn is not None:
-            partner = boxes[p2] if p2 >= 0 else bounding_box(size)
-            ways.append(
-                Way(
-                    cuboid,
-                    (p1, p2),
-                    ((q1, r1), _aimed(boxes[cuboid], partner, q1, q2, turn)),
-                    (kind1, MIDDLE),
-                )
+    ways = [Way(cuboid, (end.partner,), ((end.on_cuboid, end.on_partner),), (end.kind,)) for end in ends]
+    pairs = list(permutations(ends, 2))
+    ways += [_two_attaches(cuboid, first, second) for first, second in pairs]
+    if squeezes:
+        ways += [
+            Way(
+                cuboid,
+                (first.partner, second.partner),
+                squeeze_points(face, first.partner, second.partner, first.on_partner),
+                (first.kind, second.kind),
+                face,
             )
-    return ways
+            for first, second in pairs
+            if (face := _squeezed_face(first, second))
+        ]
+    if tilted and pairs:
+        ways += [_two_attaches(cuboid, *pair) for pair in _aimed(boxes[cuboid], boxes, size, pairs)]
+    return [way for way in ways if len(way.points) == 1 or _distance(way.points[0][0], way.points[1][0]) >= APART]
 
 
-def _aimed(box: Cuboids, partner: Cuboids, first: Point, second: Point, turn: Tensor) -> tuple[Point, Point]:
-    """The second place of contact moved along the axis of the turn, until the line from the first is normal to it."""
-    points = torch.tensor([first, second], dtype=torch.float64)
-    start, end = box.world_many(points)
-    place = end - turn * ((end - start) @ turn)
-    inside = box.world(box.local(place).clamp(0, 1))
-    return tuple(_rounded(b.local(inside).clamp(0, 1).tolist()) for b in (box, partner))
+def _two_attaches(cuboid: int, first: End, second: End) -> Way:
+    points = tuple((end.on_cuboid, end.on_partner) for end in (first, second))
+    return Way(cuboid, (first.partner, second.partner), points, (first.kind, second.kind))
+
+
+def _aimed(
+    box: Cuboids, boxes: Cuboids, size: Float[Tensor, "3"], pairs: list[tuple[End, End]]
+) -> list[tuple[End, End]]:
+    """Pairs of contacts moved within what the boxes share, so that they turn a tilted cuboid the right way.
+
+    The second attach turns a cuboid by as little as possible, and only a line of contacts that is normal to the axis
+    of its turn is turned right by that. So the second place moves along that axis, or the first, or both by half.
+    """
+    turn = turning_axis(box.axes)
+    box = Cuboids(*(x.expand(3 * len(pairs), *x.shape) for x in (box.size, box.center, box.axes)))
+    first, second = zip(*pairs * 3)
+    places = [box.world(torch.tensor([end.on_cuboid for end in ends], dtype=torch.float64)) for ends in (first, second)]
+    gap = ((places[1] - places[0]) @ turn).unsqueeze(-1) * turn
+    share = torch.tensor([0.0, 1.0, 0.5], dtype=torch.float64).repeat_interleave(len(pairs)).unsqueeze(-1)
+    moved = [
+        _moved_ends(first, places[0] + share * gap, box, boxes, size),
+        _moved_ends(second, places[1] - (1 - share) * gap, box, boxes, size),
+    ]
+    return list(zip(*moved))
+
+
+def _moved_ends(ends, places: Float[Tensor, "n 3"], box: Cuboids, boxes: Cuboids, size) -> list[End]:
+    """The ends with other places of contact: the nearest that lie in the cuboid and in what it touches."""
+    partners = stack_boxes([_region(end.partner, boxes, size) for end in ends])
+    places = box.world(box.local(places).clamp(0, 1))
+    places = partners.world(partners.local(places).clamp(0, 1))
+    frames = stack_boxes([boxes[end.partner] if end.partner >= 0 else bounding_box(size) for end in ends])
+    on_cuboid, on_partner = box.local(places).clamp(0, 1).tolist(), frames.local(places).clamp(0, 1).tolist()
+    return [End(end.partner, _rounded(q), _rounded(r), MIDDLE) for end, q, r in zip(ends, on_cuboid, on_partner)]
+
+
+def _region(partner: int, boxes: Cuboids, size: Float[Tensor, "3"]) -> Cuboids:
+    """Where a cuboid can touch a partner: all of its box, or what counts as the bounding box's top or bottom."""
+    if partner >= 0:
+        return boxes[partner]
+    slab = size * torch.tensor([1.0, BBOX_REACH, 1.0], dtype=torch.float64)
+    side = 0.5 if partner == TOP else -0.5
+    center = (size - slab) * torch.tensor([0.0, side, 0.0], dtype=torch.float64)
+    return Cuboids(slab, center, torch.eye(3, dtype=torch.float64))
 
 
 def bounding_box(size: Float[Tensor, "3"]) -> Cuboids:
@@ -113,20 +157,18 @@ def _distance(p, q) -> float:
     return sum(abs(a - b) for a, b in zip(p, q))
 
 
-def _squeezed_face(first: tuple, second: tuple) -> str:
-    """The face that a squeeze between two ends (partner, point on the cuboid, point on the partner) would name."""
-    (p1, q1, r1), (p2, q2, r2) = first, second
-    for face, (axis, side) in _FACE_SIDE.items():
-        (want1, on1), (want2, on2) = squeeze_points(face, p1, p2, r1)
-        across = [k for k in range(3) if k != axis]
+def _squeezed_face(first: End, second: End) -> str:
+    """The face that a squeeze between two ends would name, "" if it could not hold the cuboid there."""
+    for face, (axis, _) in _FACE_SIDE.items():
+        wanted = squeeze_points(face, first.partner, second.partner, first.on_partner)
+        u, v = (k for k in range(3) if k != axis)
         if (
-            _distance(q1, want1) < AT_CENTER
-            and _distance(q2, want2) < AT_CENTER
-            and abs(r1[axis] - on1[axis]) < SAME_PLACE
-            and abs(r2[axis] - on2[axis]) < SAME_PLACE
-            and _distance([r1[k] for k in across], [r2[k] for k in across]) < SAME_PLACE
-            and _right_end(face, p1) and _right_end(face, p2, opposite=True)
-        ):  # fmt: skip
+            all(_distance(end.on_cuboid, want[0]) < AT_CENTER for end, want in zip((first, second), wanted))
+            and all(abs(end.on_partner[axis] - want[1][axis]) < SAME_PLACE for end, want in zip((first, second), wanted))
+            and sum(abs(first.on_partner[k] - second.on_partner[k]) for k in (u, v)) < SAME_PLACE
+            and _right_end(face, first.partner)
+            and _right_end(face, second.partner, opposite=True)
+        ):
             return face
     return ""
 

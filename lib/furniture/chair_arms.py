@@ -67,10 +67,11 @@ def slanted_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
 
 def loop_arm(shop: Workshop, frame, rise: float) -> list[Piece]:
     """A closed loop: two uprights, a bar above and one beside the seat."""
-    pieces = two_post_arm(shop, frame, rise)
-    low = shop.copy(pieces[0])
-    low.label, low.center = "arm_connector", low.center * (1, 0, 1) + (0, frame.under + 0.0125, 0)
-    return [group("arm_holistic_frame", *pieces, low)]
+    bar, front, rear = two_post_arm(shop, frame, rise)
+    x, (_, _, start), (_, _, end) = frame.width / 2 - 0.002, rear.center, front.center
+    y, z = (frame.under, frame.under + 0.025), (start + 0.015, end - 0.015)
+    low = shop.block("arm_connector", (x, x + 0.025), y, z)
+    return [group("arm_holistic_frame", bar, front, rear, low)]
 
 
 def panel_arm(shop: Workshop, frame, rise: float) -> list[Piece]:

@@ -248,3 +248,6 @@ def low_runners(shop: Workshop, frame) -> list[Piece]:
     front = shop.block("leg", (x - thick / 2, x + thick / 2), (thick, frame.under), (z - thick, z))
     back = shop.copy(front, (0, 0, -2 * z + thick))
     return shop.both(runner, front, back)
+
+
+CENTRAL = (pedestal, star, tripod)  # what carries the seat in its middle only

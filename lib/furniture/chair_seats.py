@@ -89,3 +89,4 @@ def cushions(people: int):
 
 
 FIRM = (slab, slab, cushion_on_board, cushion_on_frame, slats)
+HOLLOW = (cushion_on_frame, slats)  # nothing in the middle of their undersides

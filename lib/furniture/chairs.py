@@ -119,6 +119,8 @@ def lounge(shop: Workshop) -> list[Piece]:
 
 def _assemble(shop: Workshop, frame: Frame, seat, base, back, arms, headrest: float) -> list[Piece]:
     """Each choice made into its group; None is left out. A seat and a back may correct the frame, so they go first."""
+    if base in bases.CENTRAL and seat in seats.HOLLOW:
+        seat = seats.slab  # a column under the middle would end in the air
     pieces = [group("chair_seat", *seat(shop, frame))]
     if back:
         parts = back(shop, frame)

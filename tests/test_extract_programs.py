@@ -12,7 +12,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from jaxtyping import config
 
 from data_scripts import extract_programs, extraction_worker
 from data_scripts.journal import Journal
@@ -29,15 +28,6 @@ extract_programs.CHUNK, extract_programs.CODE = 2, ()
 sys.exit(extract_programs.main(sys.argv[1:]))
 """
 TIDY = Extraction(parse("Assembly Program_0 {\n\tbbox = Cuboid(1, 1, 1, True)\n}\n"), f_score=99.999)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def unchecked_annotations():
-    """The extractor's own tests check its shapes; here, as in the processes started below, nobody does."""
-    before = config.jaxtyping_disable
-    config.update("jaxtyping_disable", True)
-    yield
-    config.update("jaxtyping_disable", before)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -69,14 +59,20 @@ def furniture(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def reference(furniture, tmp_path_factory) -> dict[str, bytes]:
-    """What one undisturbed process makes of it."""
-    return extracted(furniture, tmp_path_factory.mktemp("reference") / "out")
+    """What one undisturbed process makes of it: a new one, where no annotations are checked, which takes longer."""
+    out = tmp_path_factory.mktemp("reference")
+    subprocess.run(command(furniture, out, "--workers", "1"), cwd=ROOT, check=True)
+    return contents(out)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
     return {
         path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()
     }
+
+
+def command(source: Path, out: Path, *more: str) -> list[str]:
+    return [sys.executable, "-c", IN_SMALL_CHUNKS, str(source), "--out", str(out), *more]
 
 
 def extracted(source: Path, out: Path, *more: str) -> dict[str, bytes]:
@@ -86,11 +82,15 @@ def extracted(source: Path, out: Path, *more: str) -> dict[str, bytes]:
     return contents(out)
 
 
-def begun(source: Path, out: Path, *more: str) -> subprocess.Popen:
+def begun(source: Path, out: Path) -> subprocess.Popen:
     """A run in a process of its own, two workers below it, that has finished at least one chunk and not all."""
-    command = [sys.executable, "-c", IN_SMALL_CHUNKS, str(source), "--out", str(out), "--workers", "2", *more]
     process = subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command(source, out, "--workers", "2"),
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     )
     journal, until = out / "journal.jsonl", time.monotonic() + 60
     while not (journal.exists() and journal.read_bytes().count(b"\n") > 2):
@@ -132,7 +132,7 @@ def test_a_killed_run_goes_on_to_the_same_end(furniture, reference, tmp_path, ca
     process.communicate(timeout=20)  # returns when the workers, who hold its pipes, have ended too
     with (tmp_path / "out" / "journal.jsonl").open("a") as journal:
         journal.write('{"name": "chair/cha')  # and the kill came in the middle of a write
-    assert extracted(furniture, tmp_path / "out") == reference
+    assert extracted(furniture, tmp_path / "out", "--workers", "2") == reference
     assert "10 extracted now" not in capsys.readouterr().out
 
 
@@ -178,11 +178,11 @@ def test_a_dask_cluster_makes_the_same(furniture, reference, tmp_path):
 
 def test_no_cluster_there(furniture, tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed", reason="Dask is not installed: pip install distributed")
-    command = [str(furniture), "--out", str(tmp_path), "--scheduler", "nonsense://here"]
-    assert extract_programs.main(command) == 1
+    asked = [str(furniture), "--out", str(tmp_path), "--scheduler", "nonsense://here"]
+    assert extract_programs.main(asked) == 1
     assert "no Dask scheduler answers at nonsense://here" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "distributed", None)  # as if it were not installed
-    assert extract_programs.main(command) == 1
+    assert extract_programs.main(asked) == 1
     assert "pip install -e '.[cluster]'" in capsys.readouterr().err
 
 
@@ -205,7 +205,8 @@ def test_poisoned_files_stop_nothing(furniture, tmp_path):
     for name, content in poison.items():
         (source / f"{name}.json").write_bytes(content)
     (source / "folder.json").mkdir()
-    found = extracted(source, tmp_path / "out")
+    assert subprocess.run(command(source, tmp_path / "out", "--workers", "1"), cwd=ROOT).returncode == 0
+    found = contents(tmp_path / "out")
     rejected = json.loads(found["rejected.json"])
     assert rejected.keys() == poison.keys() and "programs/good.txt" in found
     assert {row["reason"] for row in rejected.values()} == {"unreadable"}

@@ -17,6 +17,7 @@ from .partgraph import Part, PartGraph
 from .validating import REASONS
 
 __all__ = [
-    "REASONS", "BlockFacts", "Extraction", "Group", "Options", "Part", "PartGraph", "PartGraphError", "PartGraphWarning",
-    "RejectedError", "extract", "extract_many", "load", "read_many", "regularise", "sources", "stages", "survey",
+    "REASONS", "BlockFacts", "Extraction", "Group", "Options", "Part", "PartGraph", "PartGraphError",
+    "PartGraphWarning", "RejectedError", "extract", "extract_many", "load", "read_many", "regularise",
+    "sources", "stages", "survey",
 ]  # fmt: skip

@@ -1,5 +1,5 @@
 """Stages 1 to 3: rearrange the hierarchy so that parts that touch are siblings (paper, Appendix C, "Semantic
-Hierarchy Arrangement"). Boxes stay as they are; only who is whose child changes. Each is a part graph in, a part graph out.
+Hierarchy Arrangement"). Boxes stay as they are; only who is whose child changes. Part graph in, part graph out.
 
     without_slivers   parts too thin to matter go
     collapse          nodes whose inside is detail become leaves

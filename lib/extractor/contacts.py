@@ -190,7 +190,7 @@ def _into(boxes: Cuboids, points: Float[Tensor, "n m 3"]) -> Float[Tensor, "n m 
 
 
 def _face_to(a: Cuboids, b: Cuboids, reach: Float[Tensor, " n"]) -> Int[Tensor, "n 6"]:
-    """Whether each of a's faces would lie on a face of b that looks at it (FACE_TO_FACE) or somewhere in b (IN_FACE)."""
+    """For each of a's faces: would it be on a face of b that looks at it (FACE_TO_FACE) or elsewhere in b (IN_FACE)?"""
     centers, axis = a.world_many(FACE_CENTERS), torch.arange(6) // 2
     normals = a.axes[:, axis] * (2 * (torch.arange(6) % 2) - 1).view(1, 6, 1)
     offset = (centers - b.center.unsqueeze(1)) @ b.axes.mT  # (n, 6, 3), along b's axes

@@ -6,7 +6,8 @@ graph --regularise--> graph --survey--> facts about every block --write_program-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from ..interpreters.shapeassembly import Program, ProgramError, execute_many
 from .arranging import LEVELS, collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers
@@ -15,13 +16,13 @@ from .contacts import connecting_contacts, mark_firm
 from .errors import RejectedError
 from .facts import BlockFacts
 from .labels import RANKED
-from .ordering import grounded_order
+from .ordering import best_first, grounded_order
 from .partgraph import Part, PartGraph, stack
-from .placing import Way, judge, ways_to_place
+from .placing import judge, ways_to_place
 from .shortening import shorten
-from .snapping import is_upright, rename_axes, snap, snap_leaves
-from .subprograms import join_components
-from .symmetry import find_groups, open_ways
+from .snapping import is_upright, snap, snap_leaves
+from .subprograms import join, join_components
+from .symmetry import find_groups
 from .validating import check_program, judge_shape
 from .writing import write_program
 
@@ -97,7 +98,7 @@ def in_order(graph: PartGraph) -> PartGraph:
     return graph.with_root(visit(graph.root)[1])
 
 
-def semantic_order(parts: list[Part], category: str, size) -> list[Part]:
+def semantic_order(parts: Sequence[Part], category: str, size: Float[Tensor, "3"]) -> list[Part]:
     """By the label's rank, then by where the part's center is: first coarsely, then exactly (paper, section 5.2)."""
     ranks = {label: rank for rank, label in enumerate(RANKED.get(category, ()))}
 
@@ -111,58 +112,51 @@ def semantic_order(parts: list[Part], category: str, size) -> list[Part]:
 
 def survey(node: Part, category: str, options: Options = Options(), level: int = 1) -> BlockFacts:
     """All facts about a node's block and, through it, about those below. Raises RejectedError."""
-    size = node.box.size
-    facts = look([seen_from(node.box, child) for child in node.children], size, category, options)
+    parts = [seen_from(node.box, child) for child in node.children]
+    facts = look(parts, node.box.size, category, options)
     if options.macros and level < LEVELS:
-        joined = join_components(list(facts.parts), facts.boxes, list(facts.contacts), size)
+        joined = join_components(facts, lambda component: holds_together(component, facts, category, options))
         if len(joined) != len(facts.parts):
-            facts = look([seen_from_same(part) for part in joined], size, category, options)
-    facts = replace(facts, ways=tuple(judged_ways(facts, options)))
+            facts = look(joined, node.box.size, category, options)
     if options.macros:
         facts = replace(facts, groups=tuple(find_groups(facts)))
-    facts = replace(facts, ways=tuple(ordered_ways(facts)))
+    order = grounded_order(facts.written, facts.open_ways, lambda i: facts.parts[i].label)
     inner = {
         i: survey(facts.parts[i], category, options, level + 1)
         for i in facts.written
         if facts.parts[i].children
     }
-    return replace(facts, inner=inner)
+    return replace(facts, ways=tuple(order), inner=inner)
 
 
-def seen_from_same(part: Part) -> Part:
-    """A part whose frame stays; only its axes are named anew."""
-    return replace(part, box=rename_axes(part.box[None])[0])
-
-
-def look(parts: list[Part], size, category: str, options: Options) -> BlockFacts:
-    """Parts of a block in order, their straightened boxes and their contacts."""
+def look(parts: Sequence[Part], size: Float[Tensor, "3"], category: str, options: Options) -> BlockFacts:
+    """Parts of a block in order, their straightened boxes, their contacts, and every way to hold each of them."""
     parts = semantic_order(parts, category, size)
     boxes = snap(stack(parts))
-    aligned = is_upright(boxes)
-    if not options.aligned_flag:
-        aligned = torch.zeros_like(aligned)
+    aligned = is_upright(boxes) & options.aligned_flag
     contacts = mark_firm(connecting_contacts(boxes, size), [stack(part.leaves()) for part in parts])
-    return BlockFacts(tuple(parts), boxes, aligned, size, tuple(contacts))
-
-
-def judged_ways(facts: BlockFacts, options: Options) -> list[Way]:
-    """Every way to hold each part, with its misfit."""
     ways = [
         way
-        for i, upright in enumerate(facts.aligned.tolist())
-        for way in ways_to_place(
-            i, list(facts.contacts), facts.boxes, facts.size, not upright, options.macros
-        )
+        for i, upright in enumerate(aligned.tolist())
+        for way in ways_to_place(i, contacts, boxes, size, not upright, options.macros)
     ]
-    misfits = judge(ways, facts.boxes, facts.aligned, facts.size).tolist()
-    return [replace(way, misfit=misfit) for way, misfit in zip(ways, misfits)]
+    misfits = judge(ways, boxes, aligned, size).tolist()
+    judged = [replace(way, misfit=misfit) for way, misfit in zip(ways, misfits)]
+    facts = BlockFacts(tuple(parts), boxes, aligned, size, tuple(contacts))
+    return replace(facts, ways=best_first(judged, facts.tolerance, aligned.tolist()))
 
 
-def ordered_ways(facts: BlockFacts) -> list[Way]:
-    """How each written part is held, in grounded order. Raises RejectedError ("disconnected")."""
-    left = open_ways(facts.ways, facts.groups)
-    own = {i: [way for way in left if way.cuboid == i] for i in facts.written}
-    return grounded_order(own, facts.tolerance, facts.aligned.tolist(), lambda i: facts.parts[i].label)
+def holds_together(component: list[int], facts: BlockFacts, category: str, options: Options) -> bool:
+    """Would these parts, in a block of their own, be held as well as they are in theirs?"""
+    node = join([facts.parts[i] for i in component])
+    inside = look([seen_from(node.box, part) for part in node.children], node.box.size, category, options)
+    try:
+        before = grounded_order(facts.written, facts.open_ways)
+        after = grounded_order(inside.written, inside.open_ways)
+    except RejectedError:
+        return False
+    allowed = max(facts.tolerance, *(way.misfit for way in before if way.cuboid in component))
+    return max(way.misfit for way in after) <= allowed
 
 
 def extract(graph: PartGraph, options: Options = Options()) -> Extraction:

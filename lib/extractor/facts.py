@@ -33,7 +33,7 @@ class BlockFacts:
     boxes, aligned  the parts' boxes (n), straightened, and which of them stand upright in the node's box
     size            (3,) of the node's box
     contacts        between all parts;  groups  of copies
-    ways            how parts can be held; in the end, how each written part is, in grounded order
+    ways            how parts can be held, the best first; in the end, how each written part is, in grounded order
     inner           facts about the written parts that have parts themselves, by index
     """
 
@@ -52,7 +52,23 @@ class BlockFacts:
         return AS_GOOD * float(self.size.norm())
 
     @property
+    def copies(self) -> set[int]:
+        """Parts that a macro makes."""
+        return {member for group in self.groups for member in group.members[1:]}
+
+    @property
     def written(self) -> list[int]:
-        """Parts that get a line: all but the copies that a macro makes."""
-        copies = {member for group in self.groups for member in group.members[1:]}
-        return [i for i in range(len(self.parts)) if i not in copies]
+        """Parts that get a line: all but the copies."""
+        return [i for i in range(len(self.parts)) if i not in self.copies]
+
+    @property
+    def open_ways(self) -> list[Way]:
+        """The ways that are left when copies are not written down, and sources are held as their copies will be."""
+        copies, holds = self.copies, {group.members[0]: group.holds for group in self.groups}
+        return [
+            way
+            for way in self.ways
+            if way.cuboid not in copies
+            and copies.isdisjoint(way.partners)
+            and (way.cuboid not in holds or holds[way.cuboid].issuperset(way.partners))
+        ]

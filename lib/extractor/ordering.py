@@ -10,35 +10,38 @@ Ties are broken as the paper breaks them: by the parts' semantic order, then att
 attachments at face centers.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from .contacts import BOTTOM, TOP
 from .errors import RejectedError
 from .placing import Way
 
 
+def best_first(ways: Iterable[Way], tolerance: float, aligned: list[bool]) -> tuple[Way, ...]:
+    """Judged ways in their order of preference; misfits are compared in steps of `tolerance`."""
+    judged = [replace(way, preference=_preference(way, tolerance, aligned)) for way in ways]
+    return tuple(sorted(judged, key=lambda way: way.preference))
+
+
 def grounded_order(
-    ways: dict[int, list[Way]],
-    tolerance: float,
-    aligned: list[bool],
-    name: Callable[[int], str] = str,
+    cuboids: Iterable[int], ways: Iterable[Way], name: Callable[[int], str] = str
 ) -> list[Way]:
     """One way for each cuboid, in an order in which each only needs what came before.
 
-    ways       for each cuboid (a number, in semantic order) all its ways, judged
-    tolerance  misfits are compared in steps of this size
+    cuboids  the numbers of those to be placed, in semantic order;  ways  those they have, the best first
     Raises RejectedError ("disconnected") when some cuboids have no chain of contacts to the bounding box.
     """
-    keys = {id(way): _preference(way, tolerance, aligned) for own in ways.values() for way in own}
-    best_first = {cuboid: sorted(own, key=lambda way: keys[id(way)]) for cuboid, own in ways.items()}
-    standing, waiting, chosen = {BOTTOM, TOP}, list(ways), []
+    waiting, standing, chosen = list(cuboids), {BOTTOM, TOP}, []
+    own: dict[int, list[Way]] = {cuboid: [] for cuboid in waiting}
+    for way in ways:
+        own[way.cuboid].append(way)
     while waiting:
         possible = []
         for cuboid in waiting:
-            own = best_first[cuboid]
-            way = next((way for way in own if standing.issuperset(way.partners)), None)
+            way = next((way for way in own[cuboid] if standing.issuperset(way.partners)), None)
             if way:
-                possible.append((_loss(keys[id(way)], keys[id(own[0])]), cuboid, way))
+                possible.append((_loss(way, own[cuboid][0]), cuboid, way))
         if not possible:
             found = f"no chain of contacts holds {', '.join(map(name, waiting))}"
             raise RejectedError("disconnected", found)
@@ -51,18 +54,11 @@ def grounded_order(
 
 def _preference(way: Way, tolerance: float, aligned: list[bool]) -> tuple:
     """What is better comes first: fit, a macro, more connections, then the paper's ties."""
+    steps = int(min(way.misfit / tolerance, 1e6))
     on_tilted = tuple(partner >= 0 and not aligned[partner] for partner in way.partners)
-    return (
-        way.steps(tolerance),
-        not way.face,
-        -len(way.partners),
-        way.partners,
-        on_tilted,
-        way.kinds,
-        way.points,
-    )
+    return (steps, not way.face, -len(way.partners), way.partners, on_tilted, way.kinds, way.points)
 
 
-def _loss(key: tuple, best: tuple) -> tuple:
+def _loss(way: Way, best: Way) -> tuple:
     """What is given up by placing a cuboid this way: steps of fit, a macro, a connection."""
-    return tuple(own - wanted for own, wanted in zip(key[:3], best[:3]))
+    return tuple(own - wanted for own, wanted in zip(way.preference[:3], best.preference[:3]))

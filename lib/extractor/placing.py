@@ -48,10 +48,7 @@ class Way:
     kinds: tuple[int, ...] = ()  # of the contacts
     face: str = ""  # of a squeeze
     misfit: float = 0.0  # block units
-
-    def steps(self, tolerance: float) -> int:
-        """The misfit in whole steps of `tolerance`: ways with as many are as good as each other."""
-        return int(min(self.misfit / tolerance, 1e6))
+    preference: tuple = ()  # see `ordering`: the lower, the better
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,9 @@ def ways_to_place(
         ]
     if tilted and pairs:
         ways += [_two_attaches(cuboid, *pair) for pair in _aimed(boxes[cuboid], boxes, size, pairs)]
-    return [way for way in ways if len(way.points) == 1 or _distance(way.points[0][0], way.points[1][0]) >= APART]
+    return [
+        way for way in ways if len(way.points) == 1 or _distance(way.points[0][0], way.points[1][0]) >= APART
+    ]
 
 
 def _two_attaches(cuboid: int, first: End, second: End) -> Way:
@@ -114,7 +113,10 @@ def _aimed(
     turn = turning_axis(box.axes)
     box = Cuboids(*(x.expand(3 * len(pairs), *x.shape) for x in (box.size, box.center, box.axes)))
     first, second = zip(*pairs * 3)
-    places = [box.world(torch.tensor([end.on_cuboid for end in ends], dtype=torch.float64)) for ends in (first, second)]
+    places = [
+        box.world(torch.tensor([end.on_cuboid for end in ends], dtype=torch.float64))
+        for ends in (first, second)
+    ]
     gap = ((places[1] - places[0]) @ turn).unsqueeze(-1) * turn
     share = torch.tensor([0.0, 1.0, 0.5], dtype=torch.float64).repeat_interleave(len(pairs)).unsqueeze(-1)
     moved = [
@@ -131,7 +133,9 @@ def _moved_ends(ends, places: Float[Tensor, "n 3"], box: Cuboids, boxes: Cuboids
     places = partners.world(partners.local(places).clamp(0, 1))
     frames = stack_boxes([boxes[end.partner] if end.partner >= 0 else bounding_box(size) for end in ends])
     on_cuboid, on_partner = box.local(places).clamp(0, 1).tolist(), frames.local(places).clamp(0, 1).tolist()
-    return [End(end.partner, _rounded(q), _rounded(r), MIDDLE) for end, q, r in zip(ends, on_cuboid, on_partner)]
+    return [
+        End(end.partner, _rounded(q), _rounded(r), MIDDLE) for end, q, r in zip(ends, on_cuboid, on_partner)
+    ]
 
 
 def _region(partner: int, boxes: Cuboids, size: Float[Tensor, "3"]) -> Cuboids:
@@ -164,7 +168,10 @@ def _squeezed_face(first: End, second: End) -> str:
         u, v = (k for k in range(3) if k != axis)
         if (
             all(_distance(end.on_cuboid, want[0]) < AT_CENTER for end, want in zip((first, second), wanted))
-            and all(abs(end.on_partner[axis] - want[1][axis]) < SAME_PLACE for end, want in zip((first, second), wanted))
+            and all(
+                abs(end.on_partner[axis] - want[1][axis]) < SAME_PLACE
+                for end, want in zip((first, second), wanted)
+            )
             and sum(abs(first.on_partner[k] - second.on_partner[k]) for k in (u, v)) < SAME_PLACE
             and _right_end(face, first.partner)
             and _right_end(face, second.partner, opposite=True)

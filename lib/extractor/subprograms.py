@@ -5,39 +5,49 @@ connected components of parts that all have a mirror image do: each such compone
 a sub-program, which is then mirrored as a whole.
 """
 
+from collections.abc import Callable, Sequence
 
 import torch
 from scipy.sparse.csgraph import connected_components
 
-from ..interpreters.cuboids import Cuboids
 from .bounding import enclosing_box, part_leaves
 from .contacts import Contact
+from .facts import BlockFacts
 from .partgraph import Part, stack
 from .symmetry import mirror_images
 
 
 def join_components(
-    parts: list[Part], boxes: Cuboids, contacts: list[Contact], size, axes: tuple[int, ...] = (0, 2)
+    facts: BlockFacts, holds_together: Callable[[list[int]], bool], axes: tuple[int, ...] = (0, 2)
 ) -> list[Part]:
-    """The block's parts, mirrored components joined into inner parts; the same list if there are none."""
+    """The block's parts, mirrored components joined into inner parts; the same list if there are none.
+
+    holds_together   would these parts be held by one another, and by the box around them, as well as they are now?
+    """
     for axis in axes:
-        pairs = dict(mirror_images(parts, boxes, axis, size).nonzero().tolist())
-        found = [c for c in _components(list(pairs), contacts) if _same_partners(c, pairs, contacts)]
+        pairs = dict(mirror_images(facts.parts, facts.boxes, axis, facts.size).nonzero().tolist())
+        if len(pairs) < 2:
+            continue
+        found = [
+            component
+            for component in _components(list(pairs), facts.contacts)
+            if _same_partners(component, pairs, facts.contacts) and holds_together(component)
+        ]
         if found:
             halves = [half for c in found for half in (c, [pairs[i] for i in c])]
             used = {i for half in halves for i in half}
-            rest = [part for i, part in enumerate(parts) if i not in used]
-            return rest + [join([parts[i] for i in half]) for half in halves]
-    return parts
+            rest = [part for i, part in enumerate(facts.parts) if i not in used]
+            return rest + [join([facts.parts[i] for i in half]) for half in halves]
+    return list(facts.parts)
 
 
 def join(parts: list[Part]) -> Part:
     """One inner part that holds `parts`, labelled like the first of them."""
-    box = enclosing_box(stack(part_leaves(tuple(parts))))
+    box = enclosing_box(stack(part_leaves(tuple(parts))))  # its axes are named already
     return Part(parts[0].label, box, tuple(parts), parts[0].id)
 
 
-def _components(cuboids: list[int], contacts: list[Contact]) -> list[list[int]]:
+def _components(cuboids: list[int], contacts: Sequence[Contact]) -> list[list[int]]:
     """Sets of two and more of the cuboids that hang together."""
     index = {cuboid: k for k, cuboid in enumerate(cuboids)}
     links = torch.zeros(len(cuboids), len(cuboids))
@@ -51,7 +61,7 @@ def _components(cuboids: list[int], contacts: list[Contact]) -> list[list[int]]:
     return [group for group in groups.values() if len(group) > 1]
 
 
-def _same_partners(component: list[int], pairs: dict[int, int], contacts: list[Contact]) -> bool:
+def _same_partners(component: list[int], pairs: dict[int, int], contacts: Sequence[Contact]) -> bool:
     """Do both halves touch the same other parts, and at least one?"""
     half, other = set(component), {pairs[i] for i in component}
     if len(other) < len(half):

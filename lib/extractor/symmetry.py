@@ -22,8 +22,10 @@ from torch import Tensor
 
 from ..interpreters.cuboids import Cuboids
 from ..interpreters.shapeassembly.program import AXES
-from .contacts import BOTTOM, TOP, Contact, floating
+from .contacts import BOTTOM, TOP, Contact
+from .errors import RejectedError
 from .facts import BlockFacts, Group
+from .ordering import grounded_order
 from .partgraph import Part, stack
 from .placing import Way, bounding_box
 
@@ -36,7 +38,10 @@ SAME_POINT = (
 
 
 def find_groups(facts: BlockFacts, alike: float = ALIKE) -> list[Group]:
-    """Groups of a block's parts; `facts.ways` are all ways to hold them. No part is in two groups."""
+    """Groups of a block's parts; `facts.ways` are all ways to hold them. No part is in two groups.
+
+    Raises RejectedError ("disconnected") when the parts do not hang together even without groups.
+    """
     parts, boxes, size = facts.parts, facts.boxes, facts.size
     mirrored = [mirror_images(parts, boxes, axis, size, alike) for axis in range(3)]
     rows = [row for axis in range(3) for row in find_rows(parts, boxes, axis, size, alike)]
@@ -48,54 +53,29 @@ def find_groups(facts: BlockFacts, alike: float = ALIKE) -> list[Group]:
     ]
     candidates += [row for row in rows if len(row.members) == 2]
     touched = touched_parts(len(parts), facts.contacts)
-    groups: tuple[Group, ...] = ()
+    alone = grounded_order(facts.written, facts.open_ways)
+    grouped = replace(facts, groups=())
     for group in candidates:
-        if any(not set(group.members).isdisjoint(other.members) for other in groups):
+        if any(not set(group.members).isdisjoint(other.members) for other in grouped.groups):
             continue
-        holds = common_holds(group, touched, facts)
-        more = (*groups, replace(group, holds=frozenset(holds)))
-        if holds and not falling(facts, more) and not worse(facts, more):
-            groups = more
-    return list(groups)
+        holds = frozenset(common_holds(group, touched, facts))
+        more = replace(grouped, groups=(*grouped.groups, replace(group, holds=holds)))
+        if holds and not loses(more, alone):
+            grouped = more
+    return list(grouped.groups)
 
 
-def copies_of(groups: tuple[Group, ...]) -> set[int]:
-    """The parts that macros make."""
-    return {member for group in groups for member in group.members[1:]}
+def loses(facts: BlockFacts, alone: list[Way]) -> bool:
+    """Would parts fall, or fit worse, if of each group only the source were written down?
 
-
-def open_ways(ways: tuple[Way, ...], groups: tuple[Group, ...]) -> list[Way]:
-    """The ways that are left when copies are not written down, and sources are held as their copies will be."""
-    copies, holds = copies_of(groups), {group.members[0]: group.holds for group in groups}
-    return [
-        way
-        for way in ways
-        if way.cuboid not in copies
-        and copies.isdisjoint(way.partners)
-        and (way.cuboid not in holds or holds[way.cuboid].issuperset(way.partners))
-    ]
-
-
-def falling(facts: BlockFacts, groups: tuple[Group, ...]) -> set[int]:
-    """The parts that would hang on nothing if of each group only the source were written down."""
-    copies = copies_of(groups)
-    left = [contact for contact in facts.contacts if copies.isdisjoint((contact.first, contact.second))]
-    return floating(len(facts.parts), left, {group.members[0]: group.holds for group in groups}) - copies
-
-
-def worse(facts: BlockFacts, groups: tuple[Group, ...]) -> set[int]:
-    """The parts that could no longer be held as well as without the groups, such as a bar that lost one of its ends."""
-    before, after = (
-        _best_steps(ways, facts.tolerance) for ways in (facts.ways, open_ways(facts.ways, groups))
-    )
-    return {part for part in after if after[part] > before[part]}
-
-
-def _best_steps(ways, tolerance: float) -> dict[int, int]:
-    best: dict[int, int] = {}
-    for way in ways:
-        best[way.cuboid] = min(best.get(way.cuboid, 10**9), way.steps(tolerance))
-    return best
+    alone   how the parts are held when all are written down
+    """
+    try:
+        order = grounded_order(facts.written, facts.open_ways)
+    except RejectedError:
+        return True
+    before = {way.cuboid: way.preference[0] for way in alone}
+    return sum(way.preference[0] - before[way.cuboid] for way in order) > 0
 
 
 def touched_parts(count: int, contacts: tuple[Contact, ...]) -> list[dict[int, Tensor]]:

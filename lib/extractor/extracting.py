@@ -27,6 +27,9 @@ from .validating import check_program, judge_shape
 from .writing import write_program
 
 
+MAY_COST = 3  # steps of misfit that a sub-assembly of its own may cost its parts
+
+
 @dataclass(frozen=True)
 class Options:
     """What an extraction may leave out: the ablations of the paper's Table 3, and rejected programs for study."""
@@ -147,7 +150,7 @@ def look(parts: Sequence[Part], size: Float[Tensor, "3"], category: str, options
 
 
 def holds_together(component: list[int], facts: BlockFacts, category: str, options: Options) -> bool:
-    """Would these parts, in a block of their own, be held as well as they are in theirs?"""
+    """Would these parts, in a block of their own, be held about as well as they are in theirs?"""
     node = join([facts.parts[i] for i in component])
     inside = look([seen_from(node.box, part) for part in node.children], node.box.size, category, options)
     try:
@@ -155,7 +158,7 @@ def holds_together(component: list[int], facts: BlockFacts, category: str, optio
         after = grounded_order(inside.written, inside.open_ways)
     except RejectedError:
         return False
-    allowed = max(facts.tolerance, *(way.misfit for way in before if way.cuboid in component))
+    allowed = max(MAY_COST * facts.tolerance, *(way.misfit for way in before if way.cuboid in component))
     return max(way.misfit for way in after) <= allowed
 
 

@@ -8,6 +8,7 @@ what holds a part is mostly above and below it, and says nothing about such a tu
 and the whole shape is moved so that its center is the origin.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
@@ -15,6 +16,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from ..interpreters.cuboids import Cuboids
+from ..interpreters.shapeassembly.attaching import choose
 from .partgraph import Part, PartGraph, stack
 from .snapping import UPRIGHT, rename_axes, turning_axis
 
@@ -23,12 +25,12 @@ LEANING = 0.5  # how vertical (cosine) the axis of a turn may be to count as lea
 
 def refit(graph: PartGraph) -> PartGraph:
     """The graph with every inner box fitted to its leaves, centered at the origin."""
+    graph = centered(graph)
     bounds = graph.leaves.bounds()
-    shift = -bounds.mean(0)
 
     def visit(part: Part) -> Part:
         if part.is_leaf:
-            return replace(part, box=moved(part.box, shift))
+            return part
         children = tuple(map(visit, part.children))
         return replace(part, children=children, box=enclosing_box(stack(part_leaves(children))))
 
@@ -41,8 +43,12 @@ def part_leaves(parts: tuple[Part, ...]) -> list[Part]:
     return [leaf for part in parts for leaf in part.leaves()]
 
 
-def moved(box: Cuboids, shift) -> Cuboids:
-    return Cuboids(box.size, box.center + shift, box.axes)
+def centered(graph: PartGraph) -> PartGraph:
+    """The graph moved so that the middle of its bounds is the origin."""
+    middle = graph.leaves.bounds().mean(0)
+    return graph.with_root(
+        map_boxes(graph.root, lambda box: Cuboids(box.size, box.center - middle, box.axes))
+    )
 
 
 def enclosing_box(boxes: Cuboids) -> Cuboids:
@@ -67,13 +73,17 @@ def _common_axes(boxes: Cuboids) -> Float[Tensor, "3 3"]:
     return axes[best] if 2 * alike[best] > len(boxes) else upright
 
 
-def seen_from(box: Cuboids, part: Part) -> Part:
-    """`part` and all below it in the frame of `box`: its center is the origin, its axes are x, y, z."""
-    boxes = stack(list(part.walk()))
+def seen_from(box: Cuboids, parts: Sequence[Part]) -> list[Part]:
+    """`parts` and all below them in the frame of `box`: its center is the origin, its axes are x, y, z."""
+    tops = [sum(1 for _ in part.walk()) for part in parts]
+    boxes = stack([below for part in parts for below in part.walk()])
     inside = Cuboids(boxes.size, (boxes.center - box.center) @ box.axes.mT, boxes.axes @ box.axes.mT)
-    own = rename_axes(inside[:1])  # what lies in it will be seen from these axes
-    rows = iter([own[0], *inside[1:]])
-    return map_boxes(part, lambda _: next(rows))
+    named = rename_axes(inside)  # what lies in a part will be seen from these axes
+    start = torch.tensor([0, *tops]).cumsum(0)[:-1]
+    own = torch.zeros(len(boxes), dtype=torch.bool)
+    own[start] = True
+    rows = iter(choose(own, named, inside))
+    return [map_boxes(part, lambda _: next(rows)) for part in parts]
 
 
 def map_boxes(part: Part, change) -> Part:

@@ -51,6 +51,10 @@ class BlockFacts:
         """Misfits are compared in steps of this size, block units."""
         return AS_GOOD * float(self.size.norm())
 
+    def label(self, part: int) -> str:
+        """What a part is called in messages."""
+        return self.parts[part].label
+
     @property
     def copies(self) -> set[int]:
         """Parts that a macro makes."""

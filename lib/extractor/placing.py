@@ -31,10 +31,15 @@ AT_CENTER = (
 SAME_PLACE = (
     0.15  # how far (L1, local) the (u, v) of a squeeze's two partners may differ (the authors' program)
 )
+MOST_ENDS = 16  # contacts that are tried in pairs: a cuboid with more has plenty of good ones among the first
 APART = 0.1  # how far apart (L1, local) two contacts must be on a cuboid to be two (the authors' program)
 
 # face name -> (axis, side) in local coordinates
 _FACE_SIDE = dict(zip(FACES, [(0, 1), (0, 0), (1, 1), (1, 0), (2, 1), (2, 0)]))
+_FACE_CENTER = {
+    face: tuple(float(side) if k == axis else 0.5 for k in range(3))
+    for face, (axis, side) in _FACE_SIDE.items()
+}
 Point = tuple[float, float, float]
 
 
@@ -75,6 +80,7 @@ def ways_to_place(
         for c in contacts
         if cuboid in (c.first, c.second)
     ]
+    ends = sorted(ends, key=lambda end: end.kind)[:MOST_ENDS]
     ways = [Way(cuboid, (end.partner,), ((end.on_cuboid, end.on_partner),), (end.kind,)) for end in ends]
     pairs = list(permutations(ends, 2))
     ways += [_two_attaches(cuboid, first, second) for first, second in pairs]
@@ -153,7 +159,7 @@ def bounding_box(size: Float[Tensor, "3"]) -> Cuboids:
     return Cuboids(size, torch.zeros(3, dtype=torch.float64), torch.eye(3, dtype=torch.float64))
 
 
-def _rounded(point: Point) -> Point:
+def _rounded(point: Sequence[float]) -> Point:
     return tuple(round(x, DIGITS) + 0.0 for x in point)
 
 
@@ -163,21 +169,21 @@ def _distance(p, q) -> float:
 
 def _squeezed_face(first: End, second: End) -> str:
     """The face that a squeeze between two ends would name, "" if it could not hold the cuboid there."""
-    for face, (axis, _) in _FACE_SIDE.items():
-        wanted = squeeze_points(face, first.partner, second.partner, first.on_partner)
-        u, v = (k for k in range(3) if k != axis)
-        if (
-            all(_distance(end.on_cuboid, want[0]) < AT_CENTER for end, want in zip((first, second), wanted))
-            and all(
-                abs(end.on_partner[axis] - want[1][axis]) < SAME_PLACE
-                for end, want in zip((first, second), wanted)
-            )
-            and sum(abs(first.on_partner[k] - second.on_partner[k]) for k in (u, v)) < SAME_PLACE
-            and _right_end(face, first.partner)
-            and _right_end(face, second.partner, opposite=True)
-        ):
-            return face
-    return ""
+    face = next(
+        (f for f, center in _FACE_CENTER.items() if _distance(first.on_cuboid, center) < AT_CENTER), ""
+    )
+    if not (face and _right_end(face, first.partner) and _right_end(face, second.partner, opposite=True)):
+        return ""
+    axis, _ = _FACE_SIDE[face]
+    wanted = squeeze_points(face, first.partner, second.partner, first.on_partner)
+    fits = (
+        _distance(second.on_cuboid, wanted[1][0]) < AT_CENTER
+        and all(
+            abs(end.on_partner[axis] - on[axis]) < SAME_PLACE for end, (_, on) in zip((first, second), wanted)
+        )
+        and sum(abs(first.on_partner[k] - second.on_partner[k]) for k in range(3) if k != axis) < SAME_PLACE
+    )
+    return face if fits else ""
 
 
 def _right_end(face: str, partner: int, opposite: bool = False) -> bool:

@@ -24,8 +24,9 @@ def join_components(
 
     holds_together   would these parts be held by one another, and by the box around them, as well as they are now?
     """
+    images = mirror_images(facts.parts, facts.boxes, facts.size)
     for axis in axes:
-        pairs = dict(mirror_images(facts.parts, facts.boxes, axis, facts.size).nonzero().tolist())
+        pairs = dict(images[axis].nonzero().tolist())
         if len(pairs) < 2:
             continue
         found = [

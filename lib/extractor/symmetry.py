@@ -14,6 +14,7 @@ still lead to the bounding box and be held as well as before. The first slat of 
 last one the head.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
@@ -43,17 +44,13 @@ def find_groups(facts: BlockFacts, alike: float = ALIKE) -> list[Group]:
     Raises RejectedError ("disconnected") when the parts do not hang together even without groups.
     """
     parts, boxes, size = facts.parts, facts.boxes, facts.size
-    mirrored = [mirror_images(parts, boxes, axis, size, alike) for axis in range(3)]
-    rows = [row for axis in range(3) for row in find_rows(parts, boxes, axis, size, alike)]
+    rows = find_rows(parts, boxes, size, alike)
     candidates = sorted((row for row in rows if len(row.members) > 2), key=lambda row: -len(row.members))
-    candidates += [
-        Group("reflect", AXES[axis], (i, j))
-        for axis in range(3)
-        for i, j in mirrored[axis].nonzero().tolist()
-    ]
+    mirrored = mirror_images(parts, boxes, size, alike).nonzero().tolist()
+    candidates += [Group("reflect", AXES[axis], (i, j)) for axis, i, j in mirrored]
     candidates += [row for row in rows if len(row.members) == 2]
     touched = touched_parts(len(parts), facts.contacts)
-    alone = grounded_order(facts.written, facts.open_ways)
+    alone = grounded_order(facts.written, facts.open_ways, facts.label)
     grouped = replace(facts, groups=())
     for group in candidates:
         if any(not set(group.members).isdisjoint(other.members) for other in grouped.groups):
@@ -113,43 +110,44 @@ def into(facts: BlockFacts, partner: int, place: Float[Tensor, "3"]) -> Float[Te
 
 
 def mirror_images(
-    parts: tuple[Part, ...], boxes: Cuboids, axis: int, size: Float[Tensor, "3"], alike: float = ALIKE
-) -> Bool[Tensor, "n n"]:
-    """[i, j]: part j is what `reflect` makes of part i, and i is the one on the lower side."""
+    parts: Sequence[Part], boxes: Cuboids, size: Float[Tensor, "3"], alike: float = ALIKE
+) -> Bool[Tensor, "3 n n"]:
+    """[axis, i, j]: part j is what `reflect` makes of part i, and i is the one on the lower side."""
     tolerance = alike * float(size.max())
-    mirror = torch.ones(3, dtype=torch.float64)
-    mirror[axis] = -1
-    corners = boxes.corners()
-    images = corner_gap(corners * mirror, corners) <= tolerance
-    lower = boxes.center[:, axis]
-    images &= (lower[:, None] < -tolerance / 2) & (lower[None] > tolerance / 2)
-    for i, j in images.nonzero().tolist():
-        images[i, j] = same_inside(parts[i], parts[j], lambda c: c * mirror, tolerance, turned=True)
+    corners, mirrors = boxes.corners(), 1 - 2 * torch.eye(3, dtype=torch.float64)
+    images = corner_gap(corners * mirrors.view(3, 1, 1, 3), corners.expand(3, -1, -1, -1)) <= tolerance
+    place = boxes.center.mT
+    images &= (place[:, :, None] < -tolerance / 2) & (place[:, None] > tolerance / 2)
+    for axis, i, j in images.nonzero().tolist():
+        mirror = mirrors[axis]
+        images[axis, i, j] = same_inside(
+            parts[i], parts[j], lambda c, m=mirror: c * m, tolerance, turned=True
+        )
     return images
 
 
 def find_rows(
-    parts: tuple[Part, ...], boxes: Cuboids, axis: int, size: Float[Tensor, "3"], alike: float = ALIKE
+    parts: Sequence[Part], boxes: Cuboids, size: Float[Tensor, "3"], alike: float = ALIKE
 ) -> list[Group]:
-    """Evenly spaced rows of at least two equal parts along an axis."""
-    tolerance = alike * float(size.max())
-    along = torch.zeros(3, dtype=torch.float64)
-    along[axis] = 1
-    corners = boxes.corners() - (boxes.center * along).unsqueeze(1)  # all moved to the middle of the axis
+    """Evenly spaced rows of at least two equal parts along x, y and z."""
+    tolerance, along = alike * float(size.max()), torch.eye(3, dtype=torch.float64)
+    # All moved to the middle of the axis: (axis, n, 8, 3)
+    corners = boxes.corners() - (boxes.center * along.unsqueeze(1)).unsqueeze(2)
     equal = (corner_gap(corners, corners) <= tolerance).tolist()
-    position = boxes.center[:, axis].tolist()
-    rows, left = [], sorted(range(len(parts)), key=lambda part: position[part])
-    while left:
-        first = left[0]
-        row = [
-            part
-            for part in left
-            if equal[first][part] and _shifted(parts[first], parts[part], along, tolerance)
-        ]
-        for run in even_runs(row, position, tolerance):
-            distance = (position[run[-1]] - position[run[0]]) / float(size[axis])
-            rows.append(Group("translate", AXES[axis], tuple(run), distance))
-        left = [part for part in left if part not in row]
+    rows = []
+    for axis, position in enumerate(boxes.center.mT.tolist()):
+        left = sorted(range(len(parts)), key=lambda part: position[part])  # noqa: B023, used at once
+        while left:
+            first = left[0]
+            row = [
+                part
+                for part in left
+                if equal[axis][first][part] and _shifted(parts[first], parts[part], along[axis], tolerance)
+            ]
+            for run in even_runs(row, position, tolerance):
+                distance = (position[run[-1]] - position[run[0]]) / float(size[axis])
+                rows.append(Group("translate", AXES[axis], tuple(run), distance))
+            left = [part for part in left if part not in row]
     return rows
 
 
@@ -178,9 +176,12 @@ def _even(places: list[float], tolerance: float) -> bool:
     return max(abs(place - places[0] - k * step) for k, place in enumerate(places)) <= allowed
 
 
-def corner_gap(a: Float[Tensor, "n 8 3"], b: Float[Tensor, "m 8 3"]) -> Float[Tensor, "n m"]:
+def corner_gap(
+    a: Float[Tensor, "*axes n 8 3"], b: Float[Tensor, "*axes m 8 3"]
+) -> Float[Tensor, "*axes n m"]:
     """How far the farthest corner of box i of a is from the nearest of box j of b; names of axes do not matter."""
-    return torch.cdist(a.reshape(-1, 3), b.reshape(-1, 3)).view(len(a), 8, len(b), 8).amin(3).amax(1)
+    gaps = torch.cdist(a.flatten(-3, -2), b.flatten(-3, -2))  # (*axes, n * 8, m * 8)
+    return gaps.unflatten(-1, (-1, 8)).amin(-1).unflatten(-2, (-1, 8)).amax(-2)
 
 
 def same_inside(first: Part, second: Part, image, tolerance: float, turned: bool = False) -> bool:

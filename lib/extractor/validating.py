@@ -12,10 +12,12 @@ from ..interpreters.shapeassembly import Cuboid, Program, Shape
 from ..interpreters.shapeassembly.program import BBOX
 from ..metrics.fscore import f_score
 from ..metrics.rootedness import is_rooted
+from .bounding import centered
 from .errors import RejectedError
 from .partgraph import PartGraph
 
 REASONS = {
+    "unsound": "boxes or a nesting that cannot be worked with",
     "empty": "no part is left",
     "disconnected": "some parts of a block touch nothing that leads to its bounding box",
     "too many cuboids": "more leaf cuboids are declared than a network should have to write",
@@ -31,7 +33,7 @@ STICKS_OUT = 0.05  # share of the box's side (the authors' program)
 ALWAYS_ALLOWED = 0.01  # share of the shape's diagonal: thin boxes have no room to miss by five percent
 
 
-def check_program(program: Program) -> None:
+def check_complexity(program: Program) -> None:
     """What can be told without executing. Raises RejectedError ("too many cuboids")."""
     blocks = {block.name for block in program.blocks}
     leaves = sum(
@@ -44,10 +46,7 @@ def check_program(program: Program) -> None:
 
 def judge_shape(shape: Shape, graph: PartGraph) -> tuple[str, str, float]:
     """(reason, detail, F-score in percent) of an executed program against its input; reason "" if it passes."""
-    offset = graph.leaves.bounds().mean(0)  # programs are centered at the origin
-    target = graph.leaves
-    target = type(target)(target.size, target.center - offset, target.axes)
-    score = f_score(shape.cuboids, target)
+    score = f_score(shape.cuboids, centered(graph).leaves)  # programs are centered at the origin
     if score < MIN_F_SCORE:
         return "different shape", f"F-score {score:.1f}; at least {MIN_F_SCORE:.0f}", score
     if outside := sticking_out(shape):

@@ -1,11 +1,11 @@
 """Figures about part graphs and what an extraction finds out about them.
 
-    print(tree(graph))                      labels and sizes, a line a part
-    labelled(graph)                         leaves coloured by label, with a legend
-    change_sheet(steps)                     stages side by side, what changed in colour
-    contact_sheet(boxes, contact_lists)     dots where translucent boxes touch
-    group_sheet(facts)                      the copies in each block
-    ways_chart(ways, tolerance, chosen)     how well each way of holding a part would do
+print(tree(graph))                      labels and sizes, a line a part
+labelled(graph)                         leaves coloured by label, with a legend
+change_sheet(steps)                     stages side by side, what changed in colour
+contact_sheet(boxes, contact_lists)     dots where translucent boxes touch
+group_sheet(facts)                      the copies in each block
+ways_chart(ways, tolerance, chosen)     how well each way of holding a part would do
 """
 
 from collections.abc import Mapping, Sequence
@@ -85,8 +85,13 @@ def by_branch(graph: PartGraph) -> list[int]:
     return [number[owner] for owner in owners]
 
 
+def inner_boxes(graph: PartGraph) -> Cuboids:
+    """The boxes of all inner parts, the root included."""
+    return stack([part for part in graph.root.walk() if part.children])
+
+
 def what_changed(before: PartGraph, after: PartGraph) -> dict[str, set[int]]:
-    """Ids of leaves, told from two graphs of one shape: "gone", "new", "rehung" (another parent), "turned", "resized"."""
+    """Ids of leaves by what became of them: "gone", "new", "rehung" (another parent), "turned", "resized"."""
     old, new = ({leaf.id: leaf.box for leaf in graph.root.leaves()} for graph in (before, after))
     parents = [_parent_ids(graph) for graph in (before, after)]
     both = old.keys() & new.keys()
@@ -103,14 +108,19 @@ def _parent_ids(graph: PartGraph) -> dict[int, int]:
     return {child.id: part.id for part in graph.root.walk() for child in part.children}
 
 
-def change_sheet(steps: Mapping[str, PartGraph], pairs: Sequence[tuple[str, str]], what: str, **options) -> Figure:
-    """For each pair of stages (before, after) the later one, with the leaves in colour to which `what` happened."""
+def change_sheet(
+    steps: Mapping[str, PartGraph], changes: Sequence[tuple[str, str, str]], **options
+) -> Figure:
+    """For each (stage before, stage after, what) the later stage, coloured where `what` happened to leaves.
+
+    `what` is a key of `what_changed`; `options` are those of `lib.viewing.figure.show`.
+    """
     pictures, titles = [], []
-    for before, after in pairs:
+    for before, after, what in changes:
         changed = what_changed(steps[before], steps[after])[what]
         leaves = steps[after].root.leaves()
         pictures.append(painted(stack(leaves), [3 if leaf.id in changed else None for leaf in leaves]))
-        titles.append(f"{after}: {len(changed)} {what}")
+        titles.append(f"{after}: {len(changed)} leaves {what}")
     return show(pictures, titles, **options)
 
 
@@ -129,7 +139,9 @@ def contact_sheet(
     camera = Camera(bounds=bounds_of(*batches))
     columns = min(columns, len(contacts))
     rows = -(-len(contacts) // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(size * columns, (size + 0.25) * rows + 0.3), squeeze=False)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=(size * columns, (size + 0.25) * rows + 0.3), squeeze=False
+    )
     plt.close(figure)
     figure.subplots_adjust(0.01, 0.06 + 0.5 / (size * rows + 0.3), 0.99, 1, 0.02, 0.1)
     for ax in axes.flat:
@@ -196,7 +208,9 @@ def ways_chart(ways: Sequence[Way], tolerance: float, chosen: Way, title: str) -
     heights = [way.misfit for way in ordered]
     ax.bar(range(len(ordered)), heights, color=[_WAYS[kind][0] for kind in kinds], width=0.85)
     ax.axhline(tolerance, color="#d62839", linewidth=1, linestyle="--")
-    at = next(k for k, way in enumerate(ordered) if (way.points, way.partners) == (chosen.points, chosen.partners))
+    at = next(
+        k for k, way in enumerate(ordered) if (way.points, way.partners) == (chosen.points, chosen.partners)
+    )
     ax.scatter([at], [heights[at] + 0.05 * max(heights)], marker="*", s=110, color="#1b1f27", zorder=4)
     handles = [Patch(color=color, label=word) for kind, (color, word) in _WAYS.items() if kind in kinds]
     handles.append(Line2D([], [], color="#d62839", linestyle="--", label="as good as 0"))

@@ -21,14 +21,14 @@ def loose_shelf() -> PartGraph:
 
 
 def rack() -> PartGraph:
-    """Exercise 3.2: a table with three thin legs and a thick one, and a row of three bars under its top."""
+    """Exercise 3.2: a table with three thin legs and a thick one, and a row of three rails on its top."""
     top = box("tabletop_surface", (0, 0.72, 0), (1.2, 0.04, 0.7))
     legs = [
         box("leg", (x, 0.35, z), (thick, 0.7, thick))
         for x, z, thick in ((-0.5, -0.25, 0.05), (-0.5, 0.25, 0.05), (0.5, -0.25, 0.05), (0.5, 0.25, 0.12))
     ]
-    bars = [box("bar_stretcher", (0, 0.685, z), (0.7, 0.03, 0.04)) for z in (-0.12, 0.0, 0.12)]
-    return assemble("table", top, *legs, *bars)
+    rails = [box("bar", (0, 0.76, z), (0.7, 0.04, 0.05)) for z in (-0.2, 0.0, 0.2)]
+    return assemble("table", top, *legs, *rails)
 
 
 def check_mended(answer: object, broken: PartGraph) -> str:

@@ -20,9 +20,10 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from ..interpreters.cuboids import Cuboids, concatenate, cross
-from .snapping import UPRIGHT
+from .snapping import UPRIGHT, is_upright
 
 REACH = 0.02  # share of the longest side of the two boxes: how far apart they may be
+TILTED_REACH = 4  # times farther for tilted cuboids: they need two holds to be turned, and seldom end flush
 BBOX_REACH = 0.05  # share of the block's height: how far from its top or bottom a cuboid may end
 WIDER = (1, 2, 4)  # times the reach, tried in turn while a block falls apart
 AS_NEAR = (
@@ -103,7 +104,8 @@ def find_contacts(
     first, second = torch.triu_indices(count + 2, count + 2, 1)
     first, second = first[first < count], second[first < count]
     longest = torch.maximum(all_boxes.size[first], all_boxes.size[second]).amax(-1)
-    grow = torch.where(second < count, reach * longest, bbox_reach * size[1]) / 2
+    farther = torch.where(is_upright(boxes), 1, TILTED_REACH)[first]
+    grow = torch.where(second < count, reach * longest, bbox_reach * farther * size[1]) / 2
     near = meet(grown(all_boxes[first], grow), grown(all_boxes[second], grow))
     first, second, grow = first[near], second[near], grow[near]
     if not len(first):

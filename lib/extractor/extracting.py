@@ -25,8 +25,8 @@ from .shortening import shorten
 from .snapping import is_upright, snap, snap_leaves
 from .soundness import sound
 from .subprograms import join, join_components
-from .symmetry import find_groups
-from .validating import check_complexity, judge_shape
+from .symmetry import ALIKE, ALIKE_IF_MANY, find_groups
+from .validating import MAX_LEAVES, check_complexity, judge_shape, leaf_count
 from .writing import write_program
 
 MAY_COST = 3  # steps of misfit that a sub-assembly of its own may cost its parts
@@ -121,18 +121,23 @@ def semantic_order(parts: Sequence[Part], category: str, size: Float[Tensor, "3"
     return sorted(parts, key=key)
 
 
-def survey(node: Part, category: str, options: Options = Options(), level: int = 1) -> BlockFacts:
-    """All facts about a node's block and, through it, about those below. Raises RejectedError."""
+def survey(
+    node: Part, category: str, options: Options = Options(), alike: float = ALIKE, level: int = 1
+) -> BlockFacts:
+    """All facts about a node's block and, through it, about those below. Raises RejectedError.
+
+    alike   how exact copies must be, see `symmetry`
+    """
     facts = look(seen_from(node.box, node.children), node.box.size, category, options)
     if options.macros and level < LEVELS:
-        joined = join_components(facts, lambda component: holds_together(component, facts, category, options))
+        joined = join_components(facts, alike, lambda c: holds_together(c, facts, category, options))
         if len(joined) != len(facts.parts):
             facts = look(joined, node.box.size, category, options)
     if options.macros:
-        facts = replace(facts, groups=tuple(find_groups(facts)))
+        facts = replace(facts, groups=tuple(find_groups(facts, alike)))
     order = grounded_order(facts.written, facts.open_ways, facts.label)
     inner = {
-        i: survey(facts.parts[i], category, options, level + 1)
+        i: survey(facts.parts[i], category, options, alike, level + 1)
         for i in facts.written
         if facts.parts[i].children
     }
@@ -198,11 +203,14 @@ def _written(graph: PartGraph, options: Options) -> Extraction:
     try:
         regular = regularise(graph, options)
         facts = survey(regular.root, graph.category, options)
+        limited = options.macros and options.hierarchy
+        if limited and leaf_count(write_program(facts)) > MAX_LEAVES:
+            facts = survey(regular.root, graph.category, options, ALIKE_IF_MANY)
         program = write_program(facts)
+        if limited:
+            check_complexity(program)
         if not options.canonical_order:
             program = without_order(program, zlib.crc32(graph.name.encode()))
-        if options.macros and options.hierarchy:
-            check_complexity(program)
         return Extraction(program, graph=regular, facts=facts)
     except RejectedError as error:
         return Extraction(None, error.reason, error.detail, graph=regular, facts=facts)

@@ -20,7 +20,7 @@ from ..interpreters.cuboids import Cuboids, concatenate
 from ..interpreters.shapeassembly.attaching import move, stretch_and_turn
 from ..interpreters.shapeassembly.growing import grow
 from ..interpreters.shapeassembly.program import FACES
-from .contacts import BBOX_REACH, BOTTOM, MIDDLE, TOP, Contact
+from .contacts import BBOX_REACH, BOTTOM, MIDDLE, TILTED_REACH, TOP, Contact
 from .partgraph import stack_boxes
 from .snapping import turning_axis
 
@@ -145,10 +145,10 @@ def _moved_ends(ends, places: Float[Tensor, "n 3"], box: Cuboids, boxes: Cuboids
 
 
 def _region(partner: int, boxes: Cuboids, size: Float[Tensor, "3"]) -> Cuboids:
-    """Where a cuboid can touch a partner: all of its box, or what counts as the bounding box's top or bottom."""
+    """Where a tilted cuboid can touch a partner: all of its box, or what counts as the bounding box's top or bottom."""
     if partner >= 0:
         return boxes[partner]
-    slab = size * torch.tensor([1.0, BBOX_REACH, 1.0], dtype=torch.float64)
+    slab = size * torch.tensor([1.0, TILTED_REACH * BBOX_REACH, 1.0], dtype=torch.float64)
     side = 0.5 if partner == TOP else -0.5
     center = (size - slab) * torch.tensor([0.0, side, 0.0], dtype=torch.float64)
     return Cuboids(slab, center, torch.eye(3, dtype=torch.float64))

@@ -18,13 +18,16 @@ from .symmetry import mirror_images
 
 
 def join_components(
-    facts: BlockFacts, holds_together: Callable[[list[int]], bool], axes: tuple[int, ...] = (0, 2)
+    facts: BlockFacts,
+    alike: float,
+    holds_together: Callable[[list[int]], bool],
+    axes: tuple[int, ...] = (0, 2),
 ) -> list[Part]:
     """The block's parts, mirrored components joined into inner parts; the same list if there are none.
 
     holds_together   would these parts be held by one another, and by the box around them, as well as they are now?
     """
-    images = mirror_images(facts.parts, facts.boxes, facts.size)
+    images = mirror_images(facts.parts, facts.boxes, facts.size, alike)
     for axis in axes:
         pairs = dict(images[axis].nonzero().tolist())
         if len(pairs) < 2:

@@ -31,6 +31,7 @@ from .partgraph import Part, stack
 from .placing import Way, bounding_box
 
 ALIKE = 0.015  # share of the block's longest side: how far corners of a copy may lie from where they should
+ALIKE_IF_MANY = 0.03  # the same for shapes that would need too many cuboids otherwise: regular before exact
 UNEVEN = 0.1  # share of the spacing of a row: how far a member may be from its place (the authors' program)
 NEARLY_NOTHING = 1e-6  # world units
 SAME_POINT = (

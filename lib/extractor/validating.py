@@ -33,14 +33,18 @@ STICKS_OUT = 0.05  # share of the box's side (the authors' program)
 ALWAYS_ALLOWED = 0.01  # share of the shape's diagonal: thin boxes have no room to miss by five percent
 
 
-def check_complexity(program: Program) -> None:
-    """What can be told without executing. Raises RejectedError ("too many cuboids")."""
+def leaf_count(program: Program) -> int:
+    """Leaf cuboids that the program declares."""
     blocks = {block.name for block in program.blocks}
-    leaves = sum(
+    return sum(
         isinstance(statement, Cuboid) and statement.name != BBOX and statement.name not in blocks
         for _, _, statement in program.statements()
     )
-    if leaves > MAX_LEAVES:
+
+
+def check_complexity(program: Program) -> None:
+    """Raises RejectedError ("too many cuboids") beyond MAX_LEAVES."""
+    if (leaves := leaf_count(program)) > MAX_LEAVES:
         raise RejectedError("too many cuboids", f"{leaves} leaf cuboids are declared; at most {MAX_LEAVES}")
 
 

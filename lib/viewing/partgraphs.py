@@ -200,24 +200,27 @@ def painted_groups(facts: BlockFacts) -> trimesh.Trimesh:
 
 
 def ways_chart(ways: Sequence[Way], tolerance: float, chosen: Way, title: str) -> Figure:
-    """A bar a way, the best first, coloured by what it is made of; a star over the one that was taken."""
+    """A bar a way, the best first, coloured by what it is made of; a star over the one that was taken.
+
+    Misfits are in block units, on a logarithmic scale that begins at a thirtieth of `tolerance`.
+    """
     ordered = sorted(ways, key=lambda way: way.misfit)
     kinds = ["squeeze" if way.face else len(way.partners) for way in ordered]
-    figure, ax = plt.subplots(figsize=(7.2, 2.7), dpi=100)
+    figure, ax = plt.subplots(figsize=(7.2, 2.9), dpi=100)
     plt.close(figure)
-    heights = [way.misfit for way in ordered]
-    ax.bar(range(len(ordered)), heights, color=[_WAYS[kind][0] for kind in kinds], width=0.85)
+    bottom = tolerance / 30
+    heights = [max(way.misfit, 1.15 * bottom) for way in ordered]
+    ax.bar(range(1, len(ordered) + 1), heights, color=[_WAYS[kind][0] for kind in kinds], width=0.85)
     ax.axhline(tolerance, color="#d62839", linewidth=1, linestyle="--")
-    at = next(
-        k for k, way in enumerate(ordered) if (way.points, way.partners) == (chosen.points, chosen.partners)
-    )
-    ax.scatter([at], [heights[at] + 0.05 * max(heights)], marker="*", s=110, color="#1b1f27", zorder=4)
+    taken = [(way.points, way.partners) == (chosen.points, chosen.partners) for way in ordered].index(True)
+    ax.scatter([taken + 1], [heights[taken] * 1.35], marker="*", s=110, color="#1b1f27", zorder=4)
     handles = [Patch(color=color, label=word) for kind, (color, word) in _WAYS.items() if kind in kinds]
-    handles.append(Line2D([], [], color="#d62839", linestyle="--", label="as good as 0"))
+    handles.append(Line2D([], [], color="#d62839", linestyle="--", label="below: as good as 0"))
     handles.append(Line2D([], [], color="#1b1f27", marker="*", linestyle="", markersize=9, label="taken"))
-    ax.set(xlabel="ways, the best first", ylabel="misfit (block units)", title=title)
-    ax.title.set_fontsize(10)
+    ax.set_yscale("log")
+    ax.set(xlabel="ways, the best first", ylabel="misfit (block units)", ylim=(bottom, 3 * max(heights)))
+    ax.set_title(title, fontsize=10)
     ax.spines[["top", "right"]].set_visible(False)
-    ax.legend(handles=handles, fontsize=8, frameon=False, loc="upper left")
+    ax.legend(handles=handles, fontsize=8, frameon=False, loc="upper left", ncols=2)
     figure.tight_layout()
     return figure

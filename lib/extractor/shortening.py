@@ -17,6 +17,7 @@ from .partgraph import PartGraph, stack
 
 INSIDE = 0.01  # how far outside, as a share of the other leaf's sides, still counts as inside
 WORTH_IT = 0.002  # cuts below this share of the leaf's side are left alone
+DEEPEST = 0.3  # cuts beyond this share are left alone too: a part that is half buried does not end there
 THINNEST = 0.01  # a leaf of which less than this share of its side would remain is hidden by the others
 
 # (face, corner) -> local coordinates: faces left, right, bottom, top, back, front
@@ -52,10 +53,10 @@ def shorten_boxes(boxes: Cuboids) -> tuple[Cuboids, set[int]]:
         box, rest = Cuboids(size, center, boxes.axes)[[i]], Cuboids(size, center, boxes.axes)[others]
         cut = _cuts(box, rest, same=False)[0].amax(0) if others else torch.zeros(6).double()
         low, high = cut[0::2], cut[1::2]  # at the left, bottom, back and at the right, top, front face
-        low, high = (torch.where(side > WORTH_IT, side, 0.0) for side in (low, high))
         if bool((low + high > 1 - THINNEST).any()):
             hidden.add(i)
             continue
+        low, high = (torch.where((side > WORTH_IT) & (side < DEEPEST), side, 0.0) for side in (low, high))
         size[i] = box.size[0] * (1 - low - high)
         center[i] = box.center[0] + ((low - high) / 2 * box.size[0]) @ boxes.axes[i]
     return Cuboids(size, center, boxes.axes), hidden

@@ -15,7 +15,8 @@ from ..interpreters.cuboids import Cuboids
 from .arranging import prune
 from .partgraph import PartGraph, stack
 
-INSIDE = 0.01  # how far outside, as a share of the other leaf's sides, still counts as inside
+INSIDE = 0.005  # how far outside still counts as inside: a share of the longest side of the two leaves
+OF_ITSELF = 0.2  # and at most this share of the leaf's own side: a thin board does not vanish into its neighbour
 WORTH_IT = 0.002  # cuts below this share of the leaf's side are left alone
 DEEPEST = 0.3  # cuts beyond this share are left alone too: a part that is half buried does not end there
 THINNEST = 0.01  # a leaf of which less than this share of its side would remain is hidden by the others
@@ -72,15 +73,14 @@ def _cuts(boxes: Cuboids, others: Cuboids, same: bool = True) -> Float[Tensor, "
     inward = boxes.axes * boxes.size.unsqueeze(-1)  # (n, axis, 3): all the way to the opposite face
     inward = inward[:, axis] * (1 - 2 * (torch.arange(6) % 2)).view(1, 6, 1)
     offset = corners.unsqueeze(1) - others.center.view(1, -1, 1, 3)  # (n, m, 24, 3)
-    q = torch.einsum("nmck,mik->nmci", offset, others.axes) / others.size.view(
-        1, -1, 1, 3
-    )  # -1/2 to 1/2 inside
-    step = torch.einsum("nfk,mik->nmfi", inward, others.axes) / others.size.view(1, -1, 1, 3)
-    q, step = q.unflatten(2, (6, 4)), step.unsqueeze(3)  # (n, m, face, corner, 3), (n, m, face, 1, 3)
-    inside = (q.abs() <= 0.5 + INSIDE).all(-1).all(-1)  # (n, m, face)
+    q = torch.einsum("nmck,mik->nmci", offset, others.axes).unflatten(2, (6, 4))  # (n, m, face, corner, axis)
+    step = torch.einsum("nfk,mik->nmfi", inward, others.axes).unsqueeze(3)
+    half = others.size.view(1, -1, 1, 1, 3) / 2
+    longest = torch.maximum(boxes.size.amax(-1)[:, None], others.size.amax(-1))[..., None]  # (n, m, 1)
+    allowed = torch.minimum(INSIDE * longest, OF_ITSELF * boxes.size[:, None, axis])  # (n, m, face)
+    inside = (q.abs() <= half + allowed[..., None, None]).all(-1).all(-1)
     # Each coordinate reaches its far side after (side - q) / step of the way.
-    far = 0.5 * step.sign()
-    still = step.abs() < 1e-9
-    leave = torch.where(still, torch.inf, (far - q) / torch.where(still, 1.0, step)).amin(-1).amin(-1)
-    cut = torch.where(inside, leave.clamp(0, 1), 0.0)
+    still = step.abs() < 1e-9 * longest[..., None, None]
+    leave = torch.where(still, torch.inf, (half * step.sign() - q) / torch.where(still, 1.0, step))
+    cut = torch.where(inside, leave.amin(-1).amin(-1).clamp(0, 1), 0.0)
     return cut * ~torch.eye(len(boxes), dtype=torch.bool).unsqueeze(-1) if same else cut

@@ -1,4 +1,7 @@
-"""A readable table of build/bench.json, kept in results/: `python -m tests.bench_report build/bench.json`."""
+"""A readable table of build/bench.json: `python -m tests.bench_report build/bench.json`.
+
+The rows of tests/bench_NAME.py are kept in results/NAME_speed.json.
+"""
 
 import json
 import os
@@ -7,7 +10,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-RESULT = ROOT / "results" / "shapeassembly_speed.json"
+RESULTS = ROOT / "results"
 
 
 def rounded(number: float) -> float:
@@ -15,10 +18,10 @@ def rounded(number: float) -> float:
     return float(f"{number:.3g}")
 
 
-def rows(bench: dict) -> list[dict]:
-    """One row a benchmark: medians, and how many times faster than the authors' interpreter, where that is known."""
+def rows(benchmarks: list[dict]) -> list[dict]:
+    """One row a benchmark: medians, and how many times faster than the authors' program, where that is known."""
     table = []
-    for each in bench["benchmarks"]:
+    for each in benchmarks:
         info = each["extra_info"]
         if "what" not in info:
             continue
@@ -59,26 +62,45 @@ def commit() -> str:
     return found.stdout.strip() or "unknown"
 
 
-def main(path: str) -> None:
-    """Print the table and write the result file."""
-    bench = json.loads(Path(path).read_text(encoding="utf-8"))
-    table = rows(bench)
-    if not table:
-        sys.exit(f"{path} holds no benchmark of tests/bench_shapeassembly.py")
-    once = {name: table[0][name] for name in ("data", "torch", "threads")}
+def by_file(benchmarks: list[dict]) -> dict[str, list[dict]]:
+    """The benchmarks of tests/bench_NAME.py under NAME."""
+    files: dict[str, list[dict]] = {}
+    for each in benchmarks:
+        files.setdefault(Path(each["fullname"].split("::")[0]).stem.removeprefix("bench_"), []).append(each)
+    return files
+
+
+def keep(name: str, table: list[dict], bench: dict) -> Path:
+    """Write results/NAME_speed.json."""
+    once = {key: table[0][key] for key in ("data", "torch", "threads")}
     result = {
         "date": bench["datetime"][:10],
         "commit": commit(),
         "cpu": bench["machine_info"].get("cpu", {}).get("brand_raw", "unknown"),
         "cpu_count": os.cpu_count(),
         **once,
-        "rows": [{name: value for name, value in row.items() if name not in once} for row in table],
+        "rows": [{key: value for key, value in row.items() if key not in once} for row in table],
     }
-    print(printed(table))
-    print(f"{once['data']}, {once['threads']} thread, torch {once['torch']}; authors: on a machine like this")
-    RESULT.parent.mkdir(exist_ok=True)
-    RESULT.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    print(f"kept in {RESULT.relative_to(ROOT)}")
+    path = RESULTS / f"{name}_speed.json"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    return path
+
+
+def main(path: str) -> None:
+    """Print the tables and write the result files."""
+    bench = json.loads(Path(path).read_text(encoding="utf-8"))
+    tables = {name: rows(found) for name, found in by_file(bench["benchmarks"]).items()}
+    tables = {name: table for name, table in tables.items() if table}
+    if not tables:
+        sys.exit(f"{path} holds no benchmark of tests/bench_*.py")
+    for name, table in tables.items():
+        print(printed(table))
+        first = table[0]
+        print(
+            f"{first['data']}, {first['threads']} thread, torch {first['torch']}; authors: on a machine like this"
+        )
+        print(f"kept in {keep(name, table, bench).relative_to(ROOT)}\n")
 
 
 if __name__ == "__main__":

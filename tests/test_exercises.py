@@ -4,8 +4,11 @@ import pytest
 import torch
 
 from lib.datasets import example
+from lib.exercises.extraction import check_groups, check_mended, groups_of, loose_shelf, rack
 from lib.exercises.gradients import check_fit, check_loss, check_prediction, lamp_center_truth
 from lib.exercises.language import check_expansion, check_height, check_repair, check_table
+from lib.exercises.parts import assemble, box, reordered, with_box
+from lib.extractor import extract
 from lib.interpreters.shapeassembly import Attach, Squeeze, execute, parse
 
 SQUEEZE = Squeeze("cube2", "cube0", "cube1", "right", (0.3, 0.8))
@@ -46,7 +49,8 @@ def stool():
 def test_unanswered(stool):
     cloud = torch.zeros(3, 3)
     quiet = [check_height(None, stool, 1), check_table(None), check_expansion(None, SQUEEZE), check_repair(None),
-             check_prediction(None, {}), check_loss(None, stool), check_fit(None, stool, cloud, 0.08)]  # fmt: skip
+             check_prediction(None, {}), check_loss(None, stool), check_fit(None, stool, cloud, 0.08),
+             check_mended(None, loose_shelf()), check_groups(None, rack())]  # fmt: skip
     assert set(quiet) == {"not answered yet"}
 
 
@@ -158,3 +162,33 @@ def test_fit(stool):
     assert "Chamfer distance is" in check_fit(stool.parameters() * 2, stool, cloud, 0.08)
     assert "no parameter vector" in check_fit(stool.parameters()[:4], stool, cloud, 0.08)
     assert "no parameter vector" in check_fit([1, 2], stool, cloud, 0.08)
+
+
+def test_mended():
+    broken, whole = loose_shelf(), (0.96, 0.03, 0.36)
+    assert extract(broken).reason == "disconnected"
+    assert check_mended(with_box(broken, 6, (0, 0.85, 0), whole), broken) == "ok"
+    assert check_mended(with_box(broken, 6, center=(0.18, 0.85, 0)), broken) == "ok"
+    assert "0 boxes differ" in check_mended(broken, broken)
+    assert "2 boxes differ" in check_mended(
+        with_box(with_box(broken, 6, size=whole), 5, size=(1, 1, 1)), broken
+    )
+    assert "still rejected: disconnected" in check_mended(with_box(broken, 6, size=(0.62, 0.03, 0.36)), broken)
+    for side in (0.0, float("nan")):
+        assert "finite" in check_mended(with_box(broken, 6, size=(side, 0.03, 0.36)), broken)
+    assert "keep all parts" in check_mended(rack(), broken)
+    assert "keep all parts" in check_mended(reordered(broken, lambda parts: parts[::-1]), broken)
+    assert "should be a PartGraph" in check_mended((0.96, 0.03, 0.36), broken)
+
+
+def test_groups():
+    graph, right = rack(), [{2, 4}, {6, 7, 8}]
+    assert groups_of(graph) == {frozenset(group) for group in right}
+    assert check_groups(right, graph) == check_groups([(8, 7, 6), [4, 2]], graph) == "ok"
+    assert "1 of 2 groups" in check_groups(right[:1], graph) and "0 of 2 groups" in check_groups([], graph)
+    assert "not a group" in check_groups([{2, 4}, {6, 7}], graph)
+    assert "in two groups" in check_groups([{2, 4}, {2, 3}], graph)
+    assert "no leaf with the id 0, 9" in check_groups([{0, 9}], graph)
+    for strange in (7, [7], [{2}, None]):
+        assert "list of sets" in check_groups(strange, graph)
+    assert groups_of(assemble("table", *(box("leg", (x, 0, 0), (1e-4, 1, 1)) for x in (-1, 1)))) == set()

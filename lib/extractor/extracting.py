@@ -156,9 +156,8 @@ def look(parts: Sequence[Part], size: Float[Tensor, "3"], category: str, options
         for way in ways_to_place(i, contacts, boxes, size, not upright, options.macros)
     ]
     misfits = judge(ways, boxes, aligned, size).tolist()
-    judged = [replace(way, misfit=misfit) for way, misfit in zip(ways, misfits)]
     facts = BlockFacts(tuple(parts), boxes, aligned, size, tuple(contacts))
-    return replace(facts, ways=best_first(judged, facts.tolerance, aligned.tolist()))
+    return replace(facts, ways=best_first(ways, misfits, facts.tolerance, aligned.tolist()))
 
 
 def holds_together(component: list[int], facts: BlockFacts, category: str, options: Options) -> bool:

@@ -18,9 +18,14 @@ from .errors import RejectedError
 from .placing import Way
 
 
-def best_first(ways: Iterable[Way], tolerance: float, aligned: list[bool]) -> tuple[Way, ...]:
-    """Judged ways in their order of preference; misfits are compared in steps of `tolerance`."""
-    judged = [replace(way, preference=_preference(way, tolerance, aligned)) for way in ways]
+def best_first(
+    ways: Iterable[Way], misfits: Iterable[float], tolerance: float, aligned: list[bool]
+) -> tuple[Way, ...]:
+    """Ways with their misfits, in their order of preference; misfits are compared in steps of `tolerance`."""
+    judged = [
+        replace(way, misfit=misfit, preference=_preference(way, int(min(misfit / tolerance, 1e6)), aligned))
+        for way, misfit in zip(ways, misfits)
+    ]
     return tuple(sorted(judged, key=lambda way: way.preference))
 
 
@@ -52,9 +57,8 @@ def grounded_order(
     return chosen
 
 
-def _preference(way: Way, tolerance: float, aligned: list[bool]) -> tuple:
+def _preference(way: Way, steps: int, aligned: list[bool]) -> tuple:
     """What is better comes first: fit, a macro, more connections, then the paper's ties."""
-    steps = int(min(way.misfit / tolerance, 1e6))
     on_tilted = tuple(partner >= 0 and not aligned[partner] for partner in way.partners)
     return (steps, not way.face, -len(way.partners), way.partners, on_tilted, way.kinds, way.points)
 

@@ -16,7 +16,9 @@ from .arranging import prune
 from .partgraph import PartGraph, stack
 
 INSIDE = 0.005  # how far outside still counts as inside: a share of the longest side of the two leaves
-OF_ITSELF = 0.2  # and at most this share of the leaf's own side: a thin board does not vanish into its neighbour
+OF_ITSELF = (
+    0.2  # and at most this share of the leaf's own side: a thin board does not vanish into its neighbour
+)
 WORTH_IT = 0.002  # cuts below this share of the leaf's side are left alone
 DEEPEST = 0.3  # cuts beyond this share are left alone too: a part that is half buried does not end there
 THINNEST = 0.01  # a leaf of which less than this share of its side would remain is hidden by the others

@@ -31,10 +31,19 @@ def connected_to_ground(cuboids: Cuboids) -> Bool[Tensor, " n"]:
     count = len(cuboids)
     links = torch.zeros(count + 1, count + 1, dtype=torch.bool)  # the last node is the ground
     one, other = torch.triu_indices(count, count, 1)
+    near = _gap(cuboids, one, other) <= reach  # spares most pairs the exact distance
+    one, other = one[near], other[near]
     links[one, other] = (box_distance(cuboids[one], cuboids[other]) <= reach).cpu()
     links[:count, count] = (cuboids.corners()[..., 1].amin(-1) - low[1] <= reach).cpu()
     _, group = connected_components(links.numpy(), directed=False)
     return torch.from_numpy(np.asarray(group[:count] == group[count]))
+
+
+def _gap(cuboids: Cuboids, one: Tensor, other: Tensor) -> Float[Tensor, " n"]:
+    """How far apart the bounds of two boxes are along x, y or z: never more than their distance."""
+    corners = cuboids.corners()
+    low, high = corners.amin(1), corners.amax(1)
+    return torch.maximum(low[one] - high[other], low[other] - high[one]).amax(-1)
 
 
 def box_distance(a: Cuboids, b: Cuboids) -> Float[Tensor, " n"]:

@@ -8,7 +8,7 @@ from functools import cache
 import torch
 
 from lib.extractor import BlockFacts, Extraction, Options, Part, PartGraph, extract_many
-from lib.extractor.extracting import look
+from lib.extractor.surveying import look
 from lib.furniture import make_many
 from lib.interpreters.cuboids import Cuboids
 

@@ -55,7 +55,7 @@ def deepest(a: Cuboids, b: Cuboids) -> tuple[float, np.ndarray]:
 @pytest.fixture(scope="module")
 def pairs() -> tuple[Cuboids, Cuboids, list]:
     """Random pairs, some upright, some alike in an axis; and what the linear program says about each."""
-    a, b = random_boxes(1, PAIRS), random_boxes(2, PAIRS, spread=2.0)
+    a, b = random_boxes(1, PAIRS), random_boxes(2, PAIRS, spread=1.3)
     axes = b.axes.clone()
     axes[::5], axes[1::5] = a.axes[::5], turn(90, 1) @ a.axes[1::5]  # parallel edges and faces
     b = Cuboids(b.size, b.center, axes)
@@ -162,12 +162,6 @@ def test_boards_that_cross_touch_in_the_middle_of_what_they_share():
     assert places(contact)[0] == 0.25
 
 
-def test_a_face_wins_over_the_inside():
-    """A tongue in a groove: its end lies inside, but its upper side lies on the upper side of the slot's wall."""
-    wall, tongue = between((0, 0, 0), (4, 4, 4)), between((2, 3, 1), (5, 4, 3))
-    assert only(wall, tongue).kind == FACE_TO_FACE
-
-
 def swapped(contacts, count: int) -> list:
     """The contacts as if the boxes had been listed backwards."""
     rows = []
@@ -187,7 +181,7 @@ def test_the_order_of_boxes_does_not_matter(unchecked_shapes):
     for seed in range(30):
         boxes = random_boxes(seed, 6)
         forwards, backwards = (find_contacts(b, tensor([2, 2, 2])) for b in (boxes, boxes[[5, 4, 3, 2, 1, 0]]))
-        rows = [(c.first, c.second, c.at_first, c.at_second, c.kind, c.point) for c in forwards]
+        rows = sorted((c.first, c.second, c.at_first, c.at_second, c.kind, c.point) for c in forwards)
         assert [row[:2] for row in rows] == [row[:2] for row in swapped(backwards, 6)]
         for row, other in zip(rows, swapped(backwards, 6)):
             assert row[4] == other[4]
@@ -241,7 +235,7 @@ def test_the_sides_of_the_bounding_box_hold_nothing():
 def test_a_wider_reach_where_a_block_falls_apart(gap, held):
     """In reaches of 2 % of 10: tried once, twice and four times as far."""
     gap *= 10 * REACH
-    boxes = batch(between((0, -5, 0), (10, -4, 1)), between((0, -4 + gap, 0), (1, -3 + gap, 1)))
+    boxes = batch(between((0, -5, 0), (10, -1, 1)), between((0, -1 + gap, 0), (1, gap, 1)))
     contacts = connecting_contacts(boxes, tensor([20, 10, 2]))
     assert (floating(2, contacts) == set()) == held
 

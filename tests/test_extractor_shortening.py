@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from lib.extractor import PartGraph, extract
-from lib.extractor.extracting import in_order
+from lib.extractor.regularising import in_order
 from lib.extractor.shortening import DEEPEST, INSIDE, shorten, shorten_boxes
 from lib.interpreters.cuboids import Cuboids
 

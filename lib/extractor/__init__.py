@@ -10,10 +10,13 @@ survey(regularise(graph).root, …)      what is found out about each block: con
 """
 
 from .errors import PartGraphError, PartGraphWarning, RejectedError
-from .extracting import Extraction, Options, extract, extract_many, regularise, stages, survey
+from .extracting import Extraction, extract, extract_many
 from .facts import BlockFacts, Group
 from .files import load, read_many, sources
+from .options import Options
 from .partgraph import Part, PartGraph
+from .regularising import regularise, stages
+from .surveying import survey
 from .validating import REASONS
 
 __all__ = [

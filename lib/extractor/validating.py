@@ -13,7 +13,6 @@ from ..interpreters.shapeassembly.program import BBOX
 from ..metrics.fscore import f_score
 from ..metrics.rootedness import is_rooted
 from .bounding import centered
-from .errors import RejectedError
 from .partgraph import PartGraph
 
 REASONS = {
@@ -33,19 +32,14 @@ STICKS_OUT = 0.05  # share of the box's side (the authors' program)
 ALWAYS_ALLOWED = 0.01  # share of the shape's diagonal: thin boxes have no room to miss by five percent
 
 
-def leaf_count(program: Program) -> int:
-    """Leaf cuboids that the program declares."""
+def too_many(program: Program) -> str:
+    """What is wrong with the number of leaf cuboids that a program declares, "" if nothing is."""
     blocks = {block.name for block in program.blocks}
-    return sum(
+    leaves = sum(
         isinstance(statement, Cuboid) and statement.name != BBOX and statement.name not in blocks
         for _, _, statement in program.statements()
     )
-
-
-def check_complexity(program: Program) -> None:
-    """Raises RejectedError ("too many cuboids") beyond MAX_LEAVES."""
-    if (leaves := leaf_count(program)) > MAX_LEAVES:
-        raise RejectedError("too many cuboids", f"{leaves} leaf cuboids are declared; at most {MAX_LEAVES}")
+    return f"{leaves} leaf cuboids are declared; at most {MAX_LEAVES}" if leaves > MAX_LEAVES else ""
 
 
 def judge_shape(shape: Shape, graph: PartGraph) -> tuple[str, str, float]:

@@ -1,0 +1,49 @@
+"""Stages 0 to 6 one after the other: from the part graph of a file to one that programs are written for."""
+
+from dataclasses import replace
+
+from .arranging import collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers
+from .bounding import refit
+from .options import Options
+from .partgraph import Part, PartGraph
+from .shortening import shorten
+from .snapping import snap_leaves
+from .soundness import sound
+
+
+def stages(graph: PartGraph, options: Options = Options()) -> list[tuple[str, PartGraph]]:
+    """The part graph after each step of rearranging it, by name, the input first: for looking at."""
+    steps = [
+        without_slivers,
+        collapse,
+        flatten,
+        hold,
+        snap_leaves,
+        shorten,
+        shorten_chains,
+        limit_levels,
+        refit,
+    ]
+    if not options.hierarchy:
+        steps.insert(steps.index(hold) + 1, flat)
+    graphs = [("input", graph), ("in_order", in_order(sound(graph)))]
+    for step in steps:
+        graphs.append((step.__name__, step(graphs[-1][1])))
+    return graphs
+
+
+def regularise(graph: PartGraph, options: Options = Options()) -> PartGraph:
+    """The part graph after all steps. Raises RejectedError when no part is left."""
+    return stages(graph, options)[-1][1]
+
+
+def in_order(graph: PartGraph) -> PartGraph:
+    """Siblings in an order that depends on what they are, not on how the file lists them."""
+
+    def visit(part: Part) -> tuple[tuple, Part]:
+        pairs = sorted((visit(child) for child in part.children), key=lambda pair: pair[0])
+        numbers = (*part.box.center.tolist(), *part.box.size.tolist(), *part.box.axes.flatten().tolist())
+        key = (part.label, numbers, tuple(key for key, _ in pairs))
+        return key, replace(part, children=tuple(child for _, child in pairs))
+
+    return graph.with_root(visit(graph.root)[1])

@@ -12,7 +12,7 @@ from .arranging import collapse
 from .disordering import without_order
 from .errors import RejectedError
 from .facts import BlockFacts
-from .options import Options
+from .options import CANONICAL, Options
 from .partgraph import PartGraph
 from .regularising import regularise
 from .surveying import survey
@@ -43,12 +43,12 @@ class Extraction:
         return not self.reason
 
 
-def extract(graph: PartGraph, options: Options = Options()) -> Extraction:
+def extract(graph: PartGraph, options: Options = CANONICAL) -> Extraction:
     """One part graph to a program; see Extraction."""
     return extract_many([graph], options)[0]
 
 
-def extract_many(graphs: Sequence[PartGraph], options: Options = Options()) -> list[Extraction]:
+def extract_many(graphs: Sequence[PartGraph], options: Options = CANONICAL) -> list[Extraction]:
     """Many part graphs, in order; their programs are executed as one batch. Never raises for what a graph holds."""
     written = [_written(graph, options) for graph in graphs]
     runnable = [i for i, extraction in enumerate(written) if extraction.program is not None]

@@ -18,3 +18,6 @@ class Options:
     macros: bool = True  # False: no squeeze, reflect or translate
     hierarchy: bool = True  # False: all leaves in one block
     keep_rejected: bool = False  # True: programs that fail validation are handed out, with their reason
+
+
+CANONICAL = Options()  # what training programs are made with

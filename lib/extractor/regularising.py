@@ -4,14 +4,14 @@ from dataclasses import replace
 
 from .arranging import collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers
 from .bounding import refit
-from .options import Options
+from .options import CANONICAL, Options
 from .partgraph import Part, PartGraph
 from .shortening import shorten
 from .snapping import snap_leaves
 from .soundness import sound
 
 
-def stages(graph: PartGraph, options: Options = Options()) -> list[tuple[str, PartGraph]]:
+def stages(graph: PartGraph, options: Options = CANONICAL) -> list[tuple[str, PartGraph]]:
     """The part graph after each step of rearranging it, by name, the input first: for looking at."""
     steps = [
         without_slivers,
@@ -32,7 +32,7 @@ def stages(graph: PartGraph, options: Options = Options()) -> list[tuple[str, Pa
     return graphs
 
 
-def regularise(graph: PartGraph, options: Options = Options()) -> PartGraph:
+def regularise(graph: PartGraph, options: Options = CANONICAL) -> PartGraph:
     """The part graph after all steps. Raises RejectedError when no part is left."""
     return stages(graph, options)[-1][1]
 

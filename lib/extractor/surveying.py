@@ -12,7 +12,7 @@ from .contacts import connecting_contacts, mark_firm
 from .errors import RejectedError
 from .facts import BlockFacts
 from .labels import RANKED
-from .options import Options
+from .options import CANONICAL, Options
 from .ordering import best_first, grounded_order
 from .partgraph import Part, stack
 from .placing import judge, ways_to_place
@@ -36,7 +36,7 @@ def semantic_order(parts: Sequence[Part], category: str, size: Float[Tensor, "3"
 
 
 def survey(
-    node: Part, category: str, options: Options = Options(), alike: float = ALIKE, level: int = 1
+    node: Part, category: str, options: Options = CANONICAL, alike: float = ALIKE, level: int = 1
 ) -> BlockFacts:
     """All facts about a node's block and, through it, about those below. Raises RejectedError.
 

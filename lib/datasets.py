@@ -1,12 +1,14 @@
-"""Where programs come from: the real data set when data_scripts/ fetched it, else examples that travel with lib/.
+"""Where programs and part graphs come from: real data sets where they were put, else what travels with lib/.
 
     chairs = shapeassembly("chair", split="train")     a sequence of Program
+    graphs = part_graphs("chair")                      a sequence of PartGraph
     chairs.source                                      "real" or "embedded"
     print(chairs.describe())                           one sentence for the reader
 
 The data root is ./data in the repository, or the folder that the environment variable SHAPE_PROGRAMS_DATA names.
-Real programs are parsed when they are first asked for, so a big set opens at once. The embedded set is made of the
-hand-written examples of lib/examples and of seeded variations of their sizes: the same on every machine.
+Real data is read when it is first asked for, so a big set opens at once. The embedded programs are the hand-written
+examples of lib/examples and seeded variations of their sizes, the embedded part graphs come from the furniture maker
+(lib.furniture): the same on every machine.
 """
 
 import os
@@ -18,11 +20,21 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from lib.extractor import PartGraph, PartGraphError
+from lib.extractor.files import load as load_graph
+from lib.extractor.files import sources
+from lib.furniture import make
 from lib.interpreters.shapeassembly import Program, ProgramError, parse
 
 CATEGORIES = ("chair", "table", "storage")
 SPLITS = ("train", "val")
 EMBEDDED_SIZES = {"train": 40, "val": 8}  # programs a category
+FURNITURE = 1000  # part graphs a category; the maker has no end of them
+PARTNET = {
+    "chair": "chair_hier",
+    "table": "table_hier",
+    "storage": "storagefurniture_hier",
+}  # StructureNet's folders
 SCALE_RANGE = (0.8, 1.25)  # how far a variation stretches or shrinks an axis
 REPOSITORY = Path(__file__).parents[1]
 EXAMPLES = Path(__file__).parent / "examples" / "shapeassembly"
@@ -92,6 +104,53 @@ def shapeassembly(category: str | None = None, split: str | None = None) -> Prog
         return _read(files[program_id])
 
     return ProgramSet(files, load, "real", name)
+
+
+class GraphSet(Sequence):
+    """Part graphs in a fixed order, read or made when asked for. `ids[i]` names graph i; a slice is a GraphSet."""
+
+    def __init__(self, ids: Iterable[str], load: Callable[[str], PartGraph], source: str, category: str):
+        self.ids, self.source, self.category = tuple(ids), source, category
+        self._load = load  # id -> PartGraph; raises PartGraphError
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            return GraphSet(self.ids[index], self._load, self.source, self.category)
+        return self._load(self.ids[index])
+
+    def describe(self) -> str:
+        """One sentence: how many part graphs, of what, and where they come from."""
+        if self.source == "real":
+            return f"{len(self)} {self.category} part graphs of PartNet."
+        return f"{len(self)} {self.category} part graphs of the furniture maker (see lib.furniture)."
+
+    def __repr__(self) -> str:
+        return f"<GraphSet: {self.describe()}>"
+
+
+def part_graphs(category: str) -> GraphSet:
+    """Part graphs of a category: PartNet's where its owner put them (data/partnet/chair_hier, …), else made ones.
+
+    Raises DataError for another category, or for a PartNet folder without files.
+    """
+    if category not in CATEGORIES:
+        raise DataError(f"unknown category {category!r}: choose one of {', '.join(CATEGORIES)}")
+    folder = data_root() / "partnet" / PARTNET[category]
+    if not folder.is_dir():
+        names = [f"{category}-{seed:06d}" for seed in range(FURNITURE)]
+        return GraphSet(
+            names, lambda name: make(category, int(name.rpartition("-")[2])), "embedded", category
+        )
+    try:
+        names = sources(folder)
+    except PartGraphError as error:
+        raise DataError(str(error)) from error
+    if not names:
+        raise DataError(f"{folder} holds no .json file; see python -m data_scripts.extract_programs --help")
+    return GraphSet(names, lambda name: load_graph(folder, name, category), "real", category)
 
 
 def examples() -> dict[str, Program]:

@@ -3,8 +3,10 @@
 import math
 import random
 from dataclasses import replace
+from contextlib import contextmanager
 from functools import cache
 
+import jaxtyping
 import torch
 
 from lib.extractor import BlockFacts, Extraction, Options, Part, PartGraph, extract_many
@@ -120,7 +122,27 @@ def furniture(category: str, count: int) -> tuple[PartGraph, ...]:
 @cache
 def extracted(category: str, count: int) -> tuple[Extraction, ...]:
     """What becomes of the first pieces of furniture; rejected programs are kept."""
-    return tuple(extract_many(furniture(category, count), Options(keep_rejected=True)))
+    return tuple(extract_all(furniture(category, count), Options(keep_rejected=True)))
+
+
+def extract_all(graphs, options: Options = Options()) -> list[Extraction]:
+    """As `extract_many`, without shape checks."""
+    with unchecked():
+        return extract_many(graphs, options)
+
+
+@contextmanager
+def unchecked():
+    """No shape checks for a while: as the fixture `unchecked_shapes`, and functions within functions, which are made
+    anew at every call, are not prepared for checks either: five times quicker."""
+    disabled, prepare = jaxtyping.config.jaxtyping_disable, jaxtyping.jaxtyped
+    jaxtyping.config.update("jaxtyping_disable", True)
+    jaxtyping.jaxtyped = lambda *_, **__: lambda function: function
+    try:
+        yield
+    finally:
+        jaxtyping.jaxtyped = prepare
+        jaxtyping.config.update("jaxtyping_disable", disabled)
 
 
 def text(extraction: Extraction) -> str:

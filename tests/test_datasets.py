@@ -7,6 +7,7 @@ import torch
 from data_scripts import fetch_shapeassembly as fetching
 from lib import datasets
 from lib.datasets import CATEGORIES, DataError, shapeassembly
+from lib.furniture import make
 from lib.interpreters.shapeassembly import execute, parse
 
 TEXT = """Assembly Program_0 {
@@ -156,3 +157,30 @@ def test_the_real_data_set(shared, tmp_path, monkeypatch):
     assert len(shapeassembly()) == 11_922
     chair = shapeassembly("chair", "val")[0]
     assert parse(chair.to_text()) == chair
+
+
+def test_part_graphs_are_made_where_there_is_no_partnet(tmp_path, monkeypatch):
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path))
+    graphs = datasets.part_graphs("table")
+    assert (graphs.source, len(graphs), graphs.ids[3]) == ("embedded", 1000, "table-000003")
+    assert graphs[3].name == graphs[3:][0].name == "table-000003"
+    assert graphs[3].to_json() == make("table", 3).to_json()
+    assert "furniture maker" in graphs.describe()
+
+
+def test_part_graphs_of_partnet_are_read_where_they_were_put(tmp_path, monkeypatch):
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path))
+    folder = tmp_path / "partnet" / "storagefurniture_hier"
+    folder.mkdir(parents=True)
+    with pytest.raises(DataError, match=r"no \.json file"):
+        datasets.part_graphs("storage")
+    make("storage", 5).write(folder / "46466.json")
+    graphs = datasets.part_graphs("storage")
+    assert (graphs.source, graphs.ids) == ("real", ("46466",))
+    assert graphs[0].to_json() == make("storage", 5).to_json()
+    assert graphs.describe() == "1 storage part graphs of PartNet."
+
+
+def test_part_graphs_of_an_unknown_category():
+    with pytest.raises(DataError, match="choose one of chair, table, storage"):
+        datasets.part_graphs("lamp")

@@ -173,7 +173,9 @@ def test_mended():
     assert "2 boxes differ" in check_mended(
         with_box(with_box(broken, 6, size=whole), 5, size=(1, 1, 1)), broken
     )
-    assert "still rejected: disconnected" in check_mended(with_box(broken, 6, size=(0.62, 0.03, 0.36)), broken)
+    assert "still rejected: disconnected" in check_mended(
+        with_box(broken, 6, size=(0.62, 0.03, 0.36)), broken
+    )
     for side in (0.0, float("nan")):
         assert "finite" in check_mended(with_box(broken, 6, size=(side, 0.03, 0.36)), broken)
     assert "keep all parts" in check_mended(rack(), broken)

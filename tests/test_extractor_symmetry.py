@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 import torch
 
-from lib.extractor import Group, Part, extract, regularise, survey
-from lib.extractor.symmetry import ALIKE, UNEVEN, corner_gap, even_runs, find_groups, find_rows, mirror_images
+from lib.extractor import Group, Options, Part, extract, regularise, survey
+from lib.extractor.symmetry import ALIKE, ALIKE_IF_MANY, UNEVEN, corner_gap, even_runs, find_groups, find_rows, mirror_images
 from lib.interpreters.cuboids import Cuboids
 from lib.interpreters.shapeassembly import execute
 from lib.interpreters.shapeassembly.program import AXES
@@ -88,14 +88,13 @@ def test_an_uneven_row_may_still_be_pairs():
 
 def test_two_at_one_place_are_no_row():
     same = [leaf((1, 1, 1), (2, 0, 0)) for _ in range(3)]
-    boxes = batch(*(part.box for part in same))
-    assert [g for g in find_rows(same, boxes, tensor([10, 10, 10]))] == []
-    assert even_runs([0, 1, 2], [0.0, 0.0, 1.0], 0.1) == [[1, 2]] or even_runs([0, 1, 2], [0.0, 0.0, 1.0], 0.1) == []
+    assert find_rows(same, batch(*(part.box for part in same)), tensor([10, 10, 10])) == []
+    assert even_runs([0, 1], [0.0, 0.0], 0.1) == []
 
 
 def test_runs():
     assert even_runs([0, 1, 2, 3], [0.0, 1.0, 2.0, 3.0], 0.1) == [[0, 1, 2, 3]]
-    assert even_runs([3, 1, 2, 0, 4], [6.0, 1.0, 2.0, 0.0, 7.0], 0.1) == [[3, 1], [2, 0]] or True
+    assert even_runs([3, 1, 2], [1.0, 2.0, 4.0, 0.0], 0.1) == [[3, 1, 2]]
     assert even_runs([0, 1, 2, 3, 4], [0.0, 1.0, 2.0, 7.0, 8.0], 0.1) == [[0, 1, 2], [3, 4]]
     assert even_runs([0], [0.0], 0.1) == even_runs([], [], 0.1) == []
 
@@ -170,7 +169,7 @@ def test_members_must_be_held_by_something_in_common():
     assert found(*feet, *slabs, roof) == []
 
 
-def test_no_part_is_in_two_groups(unchecked_shapes):
+def test_no_part_is_in_two_groups():
     for category in CATEGORIES:
         for extraction in extracted(category, 20):
             for block in blocks(extraction.facts) if extraction.facts else []:
@@ -201,8 +200,6 @@ def test_an_H_leg_the_other_way():
 
 
 def test_no_sub_assembly_without_macros():
-    from lib.extractor import Options
-
     assert len(extract(graph(TOP, *LEGS, *SIDE_BARS), Options(macros=False)).program.blocks) == 1
 
 
@@ -221,11 +218,9 @@ def copies_of(group: Group, block) -> Cuboids:
     return Cuboids(source.size.expand(count, 3), centers, source.axes.expand(count, 3, 3))
 
 
-def test_macros_make_what_was_there(unchecked_shapes):
+def test_macros_make_what_was_there():
     """No corner farther off than copies may be (looser where there were too many cuboids), and half a digit of the
-    row's length; the place of each copy, not of the nearest one, is compared."""
-    from lib.extractor.symmetry import ALIKE_IF_MANY
-
+    row's length; sqrt 2: a place along the row and its corners may both be off."""
     kinds = set()
     for category in CATEGORIES:
         for extraction in extracted(category, 30):
@@ -258,5 +253,5 @@ def test_names_of_axes_do_not_matter():
 def test_stricter_and_looser():
     """`alike` decides how exact copies must be."""
     block = facts_of(*(leaf((1, 2, 1), (x, 0, 0)) for x in (-2.9, 3)), leaf((8, 1, 2), (0, -1.5, 0)), size=(8, 4, 4))
-    assert find_groups(block, 0.001) == [] or find_groups(block, 0.001)[0].kind == "translate"
+    assert [g.kind for g in find_groups(block, 0.001)] == ["translate"]  # in a row they may stand anywhere
     assert [g.kind for g in find_groups(block, 0.05)] == ["reflect"]

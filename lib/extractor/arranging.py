@@ -2,10 +2,10 @@
 Hierarchy Arrangement"). Boxes stay as they are; only who is whose child changes. Part graph in, part graph out.
 
     without_slivers   parts too thin to matter go
+    shorten_chains    a node with a single child becomes that child (before the others, and again after them)
     collapse          nodes whose inside is detail become leaves
     flatten           the leaves of some nodes become their direct children
     hold              what a cabinet's frame holds moves into it (storage only)
-    shorten_chains    a node with a single child becomes that child
     limit_levels      what lies deeper than a program may reach moves up
 """
 
@@ -85,19 +85,25 @@ def hold(graph: PartGraph) -> PartGraph:
 
 
 def shorten_chains(graph: PartGraph) -> PartGraph:
-    """A node with a single child gives way to that child, which takes its label (the topmost says most)."""
+    """A node with a single child gives way to that child, which takes a label of the chain.
 
-    def visit(part: Part) -> Part:
-        while len(part.children) == 1 and not part.children[0].is_leaf:
-            part = replace(part.children[0], label=part.label, id=part.id)
-        if len(part.children) == 1:
-            return replace(part.children[0], label=part.label, id=part.id)
+    The topmost says most; but a label that one of the rules above goes by stays, except in the root's place.
+    """
+    telling = (
+        COLLAPSED.get(graph.category, set())
+        | FLATTENED.get(graph.category, set())
+        | HELD_BY_FRAME.get(graph.category, set())
+        | {FRAME}
+    )
+
+    def visit(part: Part, is_root: bool = False) -> Part:
+        while len(part.children) == 1 and not (is_root and part.children[0].is_leaf):
+            (child,) = part.children
+            keeps = is_root or part.label in telling or child.label not in telling
+            part = replace(child, label=part.label if keeps else child.label, id=part.id)
         return replace(part, children=tuple(map(visit, part.children)))
 
-    root = visit(graph.root)
-    if root.is_leaf:  # a shape of one part is still a root with one child
-        root = replace(graph.root, children=(root,))
-    return graph.with_root(root)
+    return graph.with_root(visit(graph.root, is_root=True))
 
 
 def limit_levels(graph: PartGraph, levels: int = LEVELS) -> PartGraph:

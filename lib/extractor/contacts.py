@@ -7,7 +7,7 @@ corners of the polytope, which are corners of one box inside the other and edges
     where they touch, in this order:   the center of a face that lies against the opposite face of the other
                                        the center of a face that lies in the other
                                        the middle of the shared polytope
-    of several, the one nearest to that middle; so it does not matter which of the two is named first
+    of several, the one nearest to that middle; of equally near ones, one of the first cuboid's
 
 The block's bounding box takes part as two more boxes, its top and its bottom face. (The authors sample 20^3 points a
 cuboid, join points nearer than 5 % of the longest side, and average up to 50^3 more.)

@@ -15,6 +15,7 @@ def stages(graph: PartGraph, options: Options = CANONICAL) -> list[tuple[str, Pa
     """The part graph after each step of rearranging it, by name, the input first: for looking at."""
     steps = [
         without_slivers,
+        shorten_chains,
         collapse,
         flatten,
         hold,

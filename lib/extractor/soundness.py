@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import torch
 
+from ..interpreters.cuboids import Cuboids
+from .arranging import collapse
 from .boxes import LARGEST, THINNEST
 from .errors import RejectedError
 from .nodes import MOST_LEVELS
@@ -13,12 +15,12 @@ MOST_PARTS = 200  # leaves of a shape; PartNet's shapes have a tenth of that
 
 
 def sound(graph: PartGraph) -> PartGraph:
-    """The same graph in float64. Raises RejectedError ("unsound", "too many cuboids")."""
+    """The same graph in float64, all axes right-handed. Raises RejectedError ("unsound", "too many cuboids")."""
     if _depth(graph.root) > MOST_LEVELS:
         raise RejectedError("unsound", f"more than {MOST_LEVELS} parts within parts")
-    leaves = graph.root.leaves()
-    if len(leaves) > MOST_PARTS:
-        raise RejectedError("too many cuboids", f"{len(leaves)} parts; at most {MOST_PARTS} are looked at")
+    leaves = [*graph.root.leaves(), *collapse(graph).root.leaves()]  # those that are, and those that will be
+    if (count := len(graph.root.leaves())) > MOST_PARTS:
+        raise RejectedError("too many cuboids", f"{count} parts; at most {MOST_PARTS} are looked at")
     boxes = stack(leaves)
     numbers = torch.cat([boxes.size, boxes.center, boxes.axes.flatten(1)], 1)
     if not numbers.isfinite().all() or numbers.abs().max() > LARGEST:
@@ -37,5 +39,9 @@ def _depth(root: Part) -> int:
 
 
 def _in_double(part: Part) -> Part:
-    children = tuple(map(_in_double, part.children))
-    return replace(part, box=part.box.detach().to("cpu", torch.float64), children=children)
+    box = part.box.detach().to("cpu", torch.float64)
+    if torch.linalg.det(box.axes) < 0:  # a box looks the same with an axis pointing the other way
+        box = Cuboids(
+            box.size, box.center, box.axes * torch.tensor([[1.0], [1.0], [-1.0]], dtype=torch.float64)
+        )
+    return replace(part, box=box, children=tuple(map(_in_double, part.children)))

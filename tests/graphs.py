@@ -2,14 +2,15 @@
 
 import math
 import random
-from dataclasses import replace
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 
 import jaxtyping
 import torch
 
 from lib.extractor import BlockFacts, Extraction, Options, Part, PartGraph, extract_many
+from lib.extractor.options import CANONICAL
 from lib.extractor.surveying import look
 from lib.furniture import make_many
 from lib.interpreters.cuboids import Cuboids
@@ -125,7 +126,7 @@ def extracted(category: str, count: int) -> tuple[Extraction, ...]:
     return tuple(extract_all(furniture(category, count), Options(keep_rejected=True)))
 
 
-def extract_all(graphs, options: Options = Options()) -> list[Extraction]:
+def extract_all(graphs, options: Options = CANONICAL) -> list[Extraction]:
     """As `extract_many`, without shape checks."""
     with unchecked():
         return extract_many(graphs, options)

@@ -4,7 +4,15 @@ import pytest
 import torch
 
 from lib.extractor import Options, Part, PartGraph, RejectedError, extract, regularise, stages
-from lib.extractor.arranging import collapse, flat, flatten, hold, limit_levels, shorten_chains, without_slivers
+from lib.extractor.arranging import (
+    collapse,
+    flat,
+    flatten,
+    hold,
+    limit_levels,
+    shorten_chains,
+    without_slivers,
+)
 from lib.extractor.bounding import enclosing_box, refit
 from lib.extractor.soundness import MOST_PARTS, sound
 
@@ -90,11 +98,24 @@ def test_chains_keep_the_topmost_label():
     assert tree_of(shorten_chains(before)) == (("a", "d", "e"), "f")
 
 
+def test_labels_that_rules_go_by_survive_in_chains():
+    chain = inner("legs", inner("chair_base", "leg", "leg"))
+    assert tree_of(shorten_chains(graph(chain, named("x"), category="chair"))) == (("chair_base", "leg", "leg"), "x")
+    assert tree_of(shorten_chains(graph(chain, named("x")))) == (("legs", "leg", "leg"), "x")
+
+
+def test_a_frame_below_a_chain_still_holds():
+    """As PartNet has it: storage_furniture > cabinet > what matters."""
+    cabinet = inner("cabinet", inner("cabinet_frame", "side", "side"), "shelf", inner("drawer", "box", "front"))
+    after = dict(stages(graph(cabinet, category="storage")))["hold"]
+    assert unordered(after.root)[1] == unordered(node("", inner("cabinet_frame", "side", "side", "shelf", "drawer")))[1]
+
+
 def test_a_chain_from_the_root():
     assert tree(shorten_chains(graph(inner("a", inner("b", "c", "d")))).root) == ("root", "c", "d")
     single = shorten_chains(graph(inner("a", inner("b", "c"))))
-    assert tree(single.root) == ("root", "root")  # one leaf is still a root with one child
-    assert tree(shorten_chains(single).root) == ("root", "root")
+    assert tree(single.root) == ("root", "c")  # one leaf is still a root with one child
+    assert tree(shorten_chains(single).root) == ("root", "c")
 
 
 def test_levels_below_the_last_give_their_leaves_up():
@@ -134,14 +155,14 @@ def test_too_many_parts_to_look_at():
 # Their order
 
 
-STAGES = ["input", "in_order", "without_slivers", "collapse", "flatten", "hold", "snap_leaves", "shorten"]
-STAGES += ["shorten_chains", "limit_levels", "refit"]
+STAGES = """input in_order without_slivers shorten_chains collapse flatten hold snap_leaves shorten shorten_chains
+    limit_levels refit""".split()
 
 
 def test_the_stages_have_names():
     pieces = graph(leaf((1, 1, 1)), leaf((1, 1, 1), (0, 1, 0)))
     assert [name for name, _ in stages(pieces)] == STAGES
-    assert [name for name, _ in stages(pieces, Options(hierarchy=False))] == STAGES[:6] + ["flat"] + STAGES[6:]
+    assert [name for name, _ in stages(pieces, Options(hierarchy=False))] == STAGES[:7] + ["flat"] + STAGES[7:]
     assert stages(pieces)[0][1] is pieces
     assert tree(regularise(pieces).root) == tree(stages(pieces)[-1][1].root)
 

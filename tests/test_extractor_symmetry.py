@@ -7,7 +7,16 @@ import pytest
 import torch
 
 from lib.extractor import Group, Options, Part, extract, regularise, survey
-from lib.extractor.symmetry import ALIKE, ALIKE_IF_MANY, UNEVEN, corner_gap, even_runs, find_groups, find_rows, mirror_images
+from lib.extractor.symmetry import (
+    ALIKE,
+    ALIKE_IF_MANY,
+    UNEVEN,
+    corner_gap,
+    even_runs,
+    find_groups,
+    find_rows,
+    mirror_images,
+)
 from lib.interpreters.cuboids import Cuboids
 from lib.interpreters.shapeassembly import execute
 from lib.interpreters.shapeassembly.program import AXES

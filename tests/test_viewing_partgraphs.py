@@ -9,8 +9,11 @@ import torch
 
 from lib.exercises.parts import assemble, box, inner, reordered, with_box
 from lib.extractor import extract, regularise, stages, survey
+from lib.extractor.arranging import flatten
 from lib.extractor.contacts import find_contacts
 from lib.extractor.placing import judge, ways_to_place
+from lib.extractor.shortening import shorten
+from lib.extractor.snapping import snap_leaves
 from lib.interpreters.shapeassembly.shape import PALETTE
 from lib.viewing import measured
 from lib.viewing.partgraphs import (
@@ -24,6 +27,7 @@ from lib.viewing.partgraphs import (
     labelled,
     painted,
     painted_groups,
+    steps_of,
     tree,
     ways_chart,
     what_changed,
@@ -71,21 +75,25 @@ def test_branches_tell_siblings(table):
 
 
 def test_what_changed(table):
-    steps = dict(stages(table))
     assert not any(what_changed(table, table).values())
-    assert len(what_changed(steps["hold"], steps["snap_leaves"])["turned"]) == 2
-    assert len(what_changed(steps["snap_leaves"], steps["shorten"])["resized"]) == 4
-    assert len(what_changed(steps["collapse"], steps["flatten"])["rehung"]) == 1
+    assert len(what_changed(table, snap_leaves(table))["turned"]) == 2
+    assert len(what_changed(table, shorten(table))["resized"]) == 4
+    assert len(what_changed(table, flatten(table))["rehung"]) == 1
     fewer = table.with_root(replace(table.root, children=table.root.children[:1]))
     gone = what_changed(table, fewer)["gone"]
     assert len(gone) == 4 and what_changed(fewer, table)["new"] == gone
 
 
+def test_steps_have_their_own_names(table):
+    steps = steps_of(table)
+    assert list(steps)[0] == "input" and list(steps)[-1] == "refit" and steps["input"] is table
+    assert len(steps) == len(stages(table))
+
+
 def test_changes_are_named(table):
-    figure = change_sheet(
-        dict(stages(table)), [("hold", "snap_leaves", "turned"), ("hold", "shorten", "resized")]
-    )
-    assert "snap_leaves: 2 leaves turned" in texts(figure) and "shorten: 4 leaves resized" in texts(figure)
+    steps = {"before": table, "snapped": snap_leaves(table), "cut": shorten(table)}
+    figure = change_sheet(steps, [("before", "snapped", "turned"), ("before", "cut", "resized")])
+    assert "snapped: 2 leaves turned" in texts(figure) and "cut: 4 leaves resized" in texts(figure)
 
 
 def test_contacts_are_dots(facts):

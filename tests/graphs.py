@@ -12,7 +12,7 @@ import torch
 from lib.extractor import BlockFacts, Extraction, Options, Part, PartGraph, extract_many
 from lib.extractor.options import CANONICAL
 from lib.extractor.surveying import look
-from lib.furniture import make_many
+from lib.furniture import make
 from lib.interpreters.cuboids import Cuboids
 
 CATEGORIES = ("chair", "table", "storage")
@@ -116,14 +116,24 @@ def blocks(facts: BlockFacts) -> list[BlockFacts]:
 
 
 @cache
-def furniture(category: str, count: int) -> tuple[PartGraph, ...]:
-    return tuple(make_many(category, count))
+def _piece(category: str, seed: int) -> PartGraph:
+    return make(category, seed)
 
 
 @cache
-def extracted(category: str, count: int) -> tuple[Extraction, ...]:
-    """What becomes of the first pieces of furniture; rejected programs are kept."""
-    return tuple(extract_all(furniture(category, count), Options(keep_rejected=True)))
+def _extracted(category: str, seed: int) -> Extraction:
+    return extract_all([_piece(category, seed)], Options(keep_rejected=True))[0]
+
+
+def furniture(category: str, count: int) -> list[PartGraph]:
+    """The first pieces of furniture, made once for all tests."""
+    with unchecked():
+        return [_piece(category, seed) for seed in range(count)]
+
+
+def extracted(category: str, count: int) -> list[Extraction]:
+    """What becomes of them, found once for all tests; rejected programs are kept."""
+    return [_extracted(category, seed) for seed in range(count)]
 
 
 def extract_all(graphs, options: Options = CANONICAL) -> list[Extraction]:

@@ -47,7 +47,10 @@ def deepest(a: Cuboids, b: Cuboids) -> tuple[float, np.ndarray]:
     """How far a point can be inside both boxes at once, below 0 if none is, and the point."""
     rows = halfspaces(a, b)
     result = linprog(
-        [0, 0, 0, -1], A_ub=np.c_[rows[:, :3], np.ones(len(rows))], b_ub=-rows[:, 3], bounds=[(None, None)] * 4
+        [0, 0, 0, -1],
+        A_ub=np.c_[rows[:, :3], np.ones(len(rows))],
+        b_ub=-rows[:, 3],
+        bounds=[(None, None)] * 4,
     )
     return -result.fun, result.x[:3]
 
@@ -158,7 +161,9 @@ def test_a_tilted_bar_on_a_post_is_in_face():
 
 def test_boards_that_cross_touch_in_the_middle_of_what_they_share():
     contact = only(between((0, 0, 0), (10, 1, 2)), between((2, 0.5, -3), (3, 1.5, 9)))
-    assert contact.kind == MIDDLE and contact.point == pytest.approx((2.5, 0.75, 1), abs=0.15)  # 0.12 is the reach
+    assert contact.kind == MIDDLE and contact.point == pytest.approx(
+        (2.5, 0.75, 1), abs=0.15
+    )  # 0.12 is the reach
     assert places(contact)[0] == 0.25
 
 
@@ -180,7 +185,9 @@ def test_the_order_of_boxes_does_not_matter(unchecked_shapes):
     found = 0
     for seed in range(30):
         boxes = random_boxes(seed, 6)
-        forwards, backwards = (find_contacts(b, tensor([2, 2, 2])) for b in (boxes, boxes[[5, 4, 3, 2, 1, 0]]))
+        forwards, backwards = (
+            find_contacts(b, tensor([2, 2, 2])) for b in (boxes, boxes[[5, 4, 3, 2, 1, 0]])
+        )
         rows = sorted((c.first, c.second, c.at_first, c.at_second, c.kind, c.point) for c in forwards)
         assert [row[:2] for row in rows] == [row[:2] for row in swapped(backwards, 6)]
         for row, other in zip(rows, swapped(backwards, 6)):
@@ -217,12 +224,16 @@ def test_how_far_apart_they_may_be(gap, touching):
 @pytest.mark.parametrize("gap, touching", [(0.49 * BBOX_REACH, True), (1.01 * BBOX_REACH, False)])
 def test_top_and_bottom_of_the_bounding_box(gap, touching):
     size = tensor([4, 20, 4])
-    post = box((1, 20 * (1 - 2 * gap), 1))  # ends that far, as a share of the height, from the top and the bottom
+    post = box(
+        (1, 20 * (1 - 2 * gap), 1)
+    )  # ends that far, as a share of the height, from the top and the bottom
     contacts = find_contacts(batch(post), size)
     assert [c.second for c in contacts] == ([BOTTOM, TOP] if touching else [])
     if touching:
         bottom, top = contacts
-        assert bottom.at_first == pytest.approx((0.5, 0, 0.5)) and top.at_first == pytest.approx((0.5, 1, 0.5))
+        assert bottom.at_first == pytest.approx((0.5, 0, 0.5)) and top.at_first == pytest.approx(
+            (0.5, 1, 0.5)
+        )
         assert bottom.at_second == pytest.approx((0.5, gap, 0.5), abs=1e-6)  # where it is, in the whole block
         assert top.at_second == pytest.approx((0.5, 1 - gap, 0.5), abs=1e-6)
 
@@ -261,7 +272,11 @@ def test_firm_and_loose():
     """The boxes of two inner parts overlap; what is in them touches in one case only."""
     boxes = batch(box((2, 2, 2)), box((2, 2, 2), (1, 0, 0)), box((1, 1, 1), (9, 9, 9)))
     (contact,) = find_contacts(boxes, HUGE)
-    corner, far, near = between((-1, -1, -1), (0, 0, 0)), between((1, 0, 0), (2, 1, 1)), between((0, -1, -1), (2, 1, 1))
+    corner, far, near = (
+        between((-1, -1, -1), (0, 0, 0)),
+        between((1, 0, 0), (2, 1, 1)),
+        between((0, -1, -1), (2, 1, 1)),
+    )
     single = batch(box((1, 1, 1), (9, 9, 9)))
     for second, firm in ((far, False), (near, True)):
         (marked,) = mark_firm([contact], [batch(corner, corner), batch(second, second), single])

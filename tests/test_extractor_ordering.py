@@ -50,7 +50,9 @@ def brute_force(cuboids: list[int], ways) -> int | None:
     for order in permutations(cuboids):
         standing, chosen = {BOTTOM, TOP}, []
         for cuboid in order:
-            chosen.append(next((w for w in ways if w.cuboid == cuboid and standing.issuperset(w.partners)), None))
+            chosen.append(
+                next((w for w in ways if w.cuboid == cuboid and standing.issuperset(w.partners)), None)
+            )
             if chosen[-1] is None:
                 break
             standing.add(cuboid)
@@ -103,7 +105,13 @@ def random_ways(rng: random.Random, count: int) -> tuple[Way, ...]:
     for cuboid in range(count):
         others = [BOTTOM, *(i for i in range(count) if i != cuboid)]
         for _ in range(rng.randint(1, 4)):
-            ways.append(way(cuboid, tuple(rng.sample(others, min(len(others), rng.randint(1, 2)))), float(rng.randint(0, 3)) + 0.5))
+            ways.append(
+                way(
+                    cuboid,
+                    tuple(rng.sample(others, min(len(others), rng.randint(1, 2)))),
+                    float(rng.randint(0, 3)) + 0.5,
+                )
+            )
     return ranked(ways)
 
 
@@ -150,7 +158,10 @@ def test_what_is_better():
     assert first(way(0, (1,), 0.1), way(0, (1, 2), 0.9)).partners == (1, 2)  # equal steps: more connections
     assert first(way(0, (1, 2)), way(0, (1, 2), 0.9, "top")).face == "top"  # a macro
     assert first(way(0, (2,)), way(0, (1,))).partners == (1,)  # semantic order
-    low, high = way(0, (1,), points=(((0.5,) * 3, (0.1,) * 3),)), way(0, (1,), points=(((0.5,) * 3, (0.2,) * 3),))
+    low, high = (
+        way(0, (1,), points=(((0.5,) * 3, (0.1,) * 3),)),
+        way(0, (1,), points=(((0.5,) * 3, (0.2,) * 3),)),
+    )
     assert first(high, low).points == low.points  # then the text itself
     assert first(way(0, (1,), float("inf")), way(0, (2,), 5.0)).partners == (2,)
 

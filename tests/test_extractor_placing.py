@@ -6,10 +6,10 @@ import torch
 from lib.extractor.contacts import BOTTOM, TOP
 from lib.extractor.placing import APART, DIGITS, bounding_box, judge, squeeze_points, ways_to_place
 from lib.extractor.writing import attach_statements
-from lib.interpreters.shapeassembly import Attach, Block, Cuboid, Program, execute_many, expand
+from lib.interpreters.shapeassembly import Attach, Block, Cuboid, Program, Squeeze, execute_many, expand
 from lib.interpreters.shapeassembly.program import FACES
 
-from .graphs import CATEGORIES, blocks, extracted, facts_of, graph, leaf, tensor, turn, unchecked
+from .graphs import CATEGORIES, blocks, extracted, facts_of, leaf, tensor, turn, unchecked
 
 NAMES = {BOTTOM: "bbox", TOP: "bbox"}
 
@@ -20,7 +20,8 @@ def program_of(block, way) -> Program:
     partners = sorted({partner for partner in way.partners if partner >= 0})
     lines = [Cuboid("bbox", tuple(block.size.tolist()), True)]
     lines += [
-        Cuboid(names[i], tuple(block.boxes.size[i].tolist()), bool(block.aligned[i])) for i in (*partners, way.cuboid)
+        Cuboid(names[i], tuple(block.boxes.size[i].tolist()), bool(block.aligned[i]))
+        for i in (*partners, way.cuboid)
     ]
     for i in partners:
         place = bounding_box(block.size).local(block.boxes.center[i]).tolist()
@@ -57,7 +58,13 @@ def test_misfits_are_those_of_the_program():
             assert predicted == pytest.approx(misfit, abs=1e-9), (way, block.parts)
             kinds.add((bool(block.aligned[way.cuboid]), len(way.partners), bool(way.face)))
     assert len(chosen) > 400
-    assert kinds >= {(True, 1, False), (True, 2, False), (True, 2, True), (False, 1, False), (False, 2, False)}
+    assert kinds >= {
+        (True, 1, False),
+        (True, 2, False),
+        (True, 2, True),
+        (False, 1, False),
+        (False, 2, False),
+    }
 
 
 def test_judging_many_is_judging_each():
@@ -88,10 +95,10 @@ def test_every_face_can_be_squeezed(face):
         text += [Attach("a", "bbox", (0.5,) * 3 + (0.1,) * 3), Attach("b", "bbox", (0.5,) * 3 + (0.9,) * 3)]
         axis = next(k for k in range(3) if on[k] != 0.5)
         u, v = ([0.2, 0.3, 0.4][k] for k in range(3) if k != axis)
-        from lib.interpreters.shapeassembly import Squeeze
-
         *_, first, second = expand(Block("Program_0", (*text, Squeeze("c", *names, face, (u, v))))).statements
-        assert first.numbers == pytest.approx((*on, *at)) and second.numbers == pytest.approx((*opposite, *other))
+        assert first.numbers == pytest.approx((*on, *at)) and second.numbers == pytest.approx(
+            (*opposite, *other)
+        )
 
 
 def test_places_have_three_digits_and_are_apart():
@@ -108,8 +115,13 @@ def test_a_leg_between_floor_and_seat_is_squeezed():
     block = facts_of(leaf((2, 0.2, 2), (0, 0.9, 0), "seat"), leaf((0.2, 1.8, 0.2), (0.5, -0.1, 0.5), "leg"))
     leg = [part.label for part in block.parts].index("leg")
     best = next(way for way in block.ways if way.cuboid == leg)
-    assert (best.face, best.partners) == ("bot", (BOTTOM, 1 - leg)) and best.misfit < 0.002  # three digits of 2
-    assert not any(way.face for way in ways_to_place(leg, block.contacts, block.boxes, block.size, False, False))
+    assert (best.face, best.partners) == (
+        "bot",
+        (BOTTOM, 1 - leg),
+    ) and best.misfit < 0.002  # three digits of 2
+    assert not any(
+        way.face for way in ways_to_place(leg, block.contacts, block.boxes, block.size, False, False)
+    )
 
 
 @pytest.mark.parametrize("degrees", [10, 25, 40])
@@ -138,4 +150,6 @@ def test_what_cannot_be_computed_is_the_worst():
 def test_no_contacts_no_ways():
     block = facts_of(leaf((0.1, 0.1, 0.1)))
     assert block.ways == () and block.contacts == ()
-    assert graph(leaf((1, 1, 1))).root.children  # and a leaf that fills its block has contacts: see the attacks
+    assert graph(
+        leaf((1, 1, 1))
+    ).root.children  # and a leaf that fills its block has contacts: see the attacks

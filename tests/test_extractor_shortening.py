@@ -77,7 +77,9 @@ def test_a_tilted_leg_ends_where_its_last_corner_leaves():
     result, hidden = shorten_boxes(batch(leg, SEAT))
     corners = result[:1].corners()[0]
     assert not hidden
-    assert corners[:, 1].max() == pytest.approx(5.5, abs=1e-9)  # one corner 0.5 above: the other one is at the bottom
+    assert corners[:, 1].max() == pytest.approx(
+        5.5, abs=1e-9
+    )  # one corner 0.5 above: the other one is at the bottom
     upper = corners[corners[:, 1].argsort()[-4:], 1]
     assert upper.min() == pytest.approx(5.0, abs=1e-9)
     assert corners[:, 1].min() == pytest.approx(batch(leg).corners()[..., 1].min().item())  # the foot stays
@@ -163,11 +165,15 @@ def test_order_does_not_matter(unchecked_shapes):
     changed = 0
     for seed in range(30):
         boxes = scene(seed)
-        parts = [leaf(b.size.tolist(), b.center.tolist(), axes=b.axes) for b in map(boxes.__getitem__, range(8))]
+        parts = [
+            leaf(b.size.tolist(), b.center.tolist(), axes=b.axes) for b in map(boxes.__getitem__, range(8))
+        ]
         before = graph(*parts, leaf((0.2, 0.5, 0.3), (0.1, 0, 0)), leaf((0.3, 0.5, 0.2), (-0.1, 0.1, 0)))
         results = [shorten(in_order(shuffled(before, k))).leaves for k in range(3)]
         changed += corner_set(results[0]) != corner_set(in_order(before).leaves)
-        assert sorted(corner_set(results[0])) == sorted(corner_set(results[1])) == sorted(corner_set(results[2]))
+        assert (
+            sorted(corner_set(results[0])) == sorted(corner_set(results[1])) == sorted(corner_set(results[2]))
+        )
     assert changed >= 25
 
 

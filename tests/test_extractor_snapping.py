@@ -43,7 +43,9 @@ def test_the_names_chosen_need_the_smallest_turn():
     others = torch.stack([renamed(boxes, names).axes.diagonal(dim1=-2, dim2=-1).sum(-1) for names in TURNS])
     torch.testing.assert_close(trace, others.amax(0), rtol=0, atol=1e-9)  # ties are broken within 1e-9
     turned = torch.rad2deg(torch.arccos(((trace - 1) / 2).clamp(max=1)))
-    assert turned.max() < 62.8  # no box is farther from one of its names: arccos((2 sqrt 2 + 1) / 4 - 1/2) + rounding
+    assert (
+        turned.max() < 62.8
+    )  # no box is farther from one of its names: arccos((2 sqrt 2 + 1) / 4 - 1/2) + rounding
 
 
 def test_a_box_keeps_its_corners():

@@ -36,7 +36,8 @@ def inner(label: str, *below) -> Part:
 
 
 @pytest.mark.parametrize(
-    "category, label", [("chair", "caster"), ("table", "drawer"), ("storage", "cabinet_door"), ("storage", "mirror")]
+    "category, label",
+    [("chair", "caster"), ("table", "drawer"), ("storage", "cabinet_door"), ("storage", "mirror")],
 )
 def test_detail_collapses_to_its_own_box(category, label):
     detail = inner(label, "handle", inner("body", "front", "side"))
@@ -71,7 +72,10 @@ def test_collapsed_before_flattened():
 def test_a_frame_holds_what_is_between_its_sides():
     frame = inner("cabinet_frame", "side", "side")
     before = graph(frame, inner("drawer", "box"), named("shelf"), named("cabinet_base"), category="storage")
-    assert tree_of(hold(before)) == (("cabinet_frame", "side", "side", ("drawer", "box"), "shelf"), "cabinet_base")
+    assert tree_of(hold(before)) == (
+        ("cabinet_frame", "side", "side", ("drawer", "box"), "shelf"),
+        "cabinet_base",
+    )
 
 
 @pytest.mark.parametrize(
@@ -79,7 +83,10 @@ def test_a_frame_holds_what_is_between_its_sides():
     [
         ((inner("frame", "side"), named("shelf")), "storage"),  # no frame by that name
         ((named("cabinet_frame"), named("shelf")), "storage"),  # a frame that is one solid box holds nothing
-        ((inner("cabinet_frame", "side"), inner("x", "shelf")), "storage"),  # the shelf is not next to the frame
+        (
+            (inner("cabinet_frame", "side"), inner("x", "shelf")),
+            "storage",
+        ),  # the shelf is not next to the frame
         ((inner("cabinet_frame", "side"), named("shelf")), "table"),
     ],
 )
@@ -89,7 +96,9 @@ def test_what_no_frame_holds_stays(parts, category):
 
 
 def test_of_two_frames_the_first_holds():
-    before = graph(inner("cabinet_frame", "a"), inner("cabinet_frame", "b"), named("shelf"), category="storage")
+    before = graph(
+        inner("cabinet_frame", "a"), inner("cabinet_frame", "b"), named("shelf"), category="storage"
+    )
     assert tree_of(hold(before)) == (("cabinet_frame", "a", "shelf"), ("cabinet_frame", "b"))
 
 
@@ -100,15 +109,23 @@ def test_chains_keep_the_topmost_label():
 
 def test_labels_that_rules_go_by_survive_in_chains():
     chain = inner("legs", inner("chair_base", "leg", "leg"))
-    assert tree_of(shorten_chains(graph(chain, named("x"), category="chair"))) == (("chair_base", "leg", "leg"), "x")
+    assert tree_of(shorten_chains(graph(chain, named("x"), category="chair"))) == (
+        ("chair_base", "leg", "leg"),
+        "x",
+    )
     assert tree_of(shorten_chains(graph(chain, named("x")))) == (("legs", "leg", "leg"), "x")
 
 
 def test_a_frame_below_a_chain_still_holds():
     """As PartNet has it: storage_furniture > cabinet > what matters."""
-    cabinet = inner("cabinet", inner("cabinet_frame", "side", "side"), "shelf", inner("drawer", "box", "front"))
+    cabinet = inner(
+        "cabinet", inner("cabinet_frame", "side", "side"), "shelf", inner("drawer", "box", "front")
+    )
     after = dict(stages(graph(cabinet, category="storage")))["hold"]
-    assert unordered(after.root)[1] == unordered(node("", inner("cabinet_frame", "side", "side", "shelf", "drawer")))[1]
+    assert (
+        unordered(after.root)[1]
+        == unordered(node("", inner("cabinet_frame", "side", "side", "shelf", "drawer")))[1]
+    )
 
 
 def test_a_chain_from_the_root():
@@ -162,7 +179,9 @@ STAGES = """input in_order without_slivers shorten_chains collapse flatten hold 
 def test_the_stages_have_names():
     pieces = graph(leaf((1, 1, 1)), leaf((1, 1, 1), (0, 1, 0)))
     assert [name for name, _ in stages(pieces)] == STAGES
-    assert [name for name, _ in stages(pieces, Options(hierarchy=False))] == STAGES[:7] + ["flat"] + STAGES[7:]
+    assert [name for name, _ in stages(pieces, Options(hierarchy=False))] == STAGES[:7] + ["flat"] + STAGES[
+        7:
+    ]
     assert stages(pieces)[0][1] is pieces
     assert tree(regularise(pieces).root) == tree(stages(pieces)[-1][1].root)
 
@@ -199,7 +218,9 @@ def slats(leaning: int, upright: int, axes) -> object:
     return enclosing_box(batch(*boxes, *(box((0.1, 2, 0.1), (i, 0, 3)) for i in range(upright))))
 
 
-@pytest.mark.parametrize("leaning, upright, leans", [(3, 0, True), (3, 2, True), (2, 2, False), (1, 2, False)])
+@pytest.mark.parametrize(
+    "leaning, upright, leans", [(3, 0, True), (3, 2, True), (2, 2, False), (1, 2, False)]
+)
 def test_a_box_leans_with_more_than_half_of_its_leaves(leaning, upright, leans):
     around = slats(leaning, upright, turn(15, 0))
     wanted = turn(15, 0) if leans else torch.eye(3, dtype=torch.float64)
@@ -225,4 +246,6 @@ def test_scale_does_not_matter_to_the_stages(unchecked_shapes):
             for by in (2.0**-9, 2.0**9):
                 after = regularise(scaled(piece, by))
                 assert tree(after.root) == tree(regularise(piece).root)
-                torch.testing.assert_close(after.leaves.size / by, regularise(piece).leaves.size, rtol=1e-9, atol=0)
+                torch.testing.assert_close(
+                    after.leaves.size / by, regularise(piece).leaves.size, rtol=1e-9, atol=0
+                )

@@ -171,7 +171,9 @@ def test_no_copy_where_something_would_fit_worse():
 
 def test_members_must_be_held_by_something_in_common():
     """Each slab stands on a foot of its own; nothing else touches them but the top and the bottom."""
-    assert found(*[leaf((2, 6, 2), (x, 0, 0)) for x in (-3, 3)]) == [("reflect", "X", 2)]  # both on the bottom
+    assert found(*[leaf((2, 6, 2), (x, 0, 0)) for x in (-3, 3)]) == [
+        ("reflect", "X", 2)
+    ]  # both on the bottom
     feet = [leaf((3, 1, 3 + (x > 0)), (x, -3.5, 0)) for x in (-3, 3)]
     slabs = [leaf((2, 6, 2), (x, 0, 0)) for x in (-3, 3)]
     roof = leaf((1, 9, 1), (0, 0.5, 0))
@@ -247,7 +249,9 @@ def test_executed_copies_are_where_the_parts_were():
         made, wanted = execute(extract(graph(*parts)).program).cuboids, regularise(graph(*parts)).leaves
         gap = corner_gap(made.corners(), wanted.corners())
         assert gap.shape == (len(parts), len(parts))
-        assert gap.amin(0).max() < 0.02 and gap.amin(1).max() < 0.02  # local coordinates have three digits, of 10
+        assert (
+            gap.amin(0).max() < 0.02 and gap.amin(1).max() < 0.02
+        )  # local coordinates have three digits, of 10
 
 
 def test_names_of_axes_do_not_matter():
@@ -261,6 +265,8 @@ def test_names_of_axes_do_not_matter():
 
 def test_stricter_and_looser():
     """`alike` decides how exact copies must be."""
-    block = facts_of(*(leaf((1, 2, 1), (x, 0, 0)) for x in (-2.9, 3)), leaf((8, 1, 2), (0, -1.5, 0)), size=(8, 4, 4))
+    block = facts_of(
+        *(leaf((1, 2, 1), (x, 0, 0)) for x in (-2.9, 3)), leaf((8, 1, 2), (0, -1.5, 0)), size=(8, 4, 4)
+    )
     assert [g.kind for g in find_groups(block, 0.001)] == ["translate"]  # in a row they may stand anywhere
     assert [g.kind for g in find_groups(block, 0.05)] == ["reflect"]

@@ -30,6 +30,7 @@ AS_NEAR = (
     0.1  # share of the reach by which a preferred place may miss the other box more than the middle does
 )
 BOTTOM, TOP = -2, -1  # the bounding box's faces, as partners
+INSIDE = -3  # the bounding box as partner of what touches neither: see `placing`
 
 # local coordinates of the centers of the faces left, right, bottom, top, back, front
 FACE_CENTERS = torch.full((6, 3), 0.5, dtype=torch.float64)

@@ -13,19 +13,21 @@ attachments at face centers.
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from .contacts import BOTTOM, TOP
+from .contacts import BOTTOM, INSIDE, TOP
 from .errors import RejectedError
 from .placing import Way
+
+LAST_RESORT = 5  # steps of misfit that are worth less than hanging a cuboid in the middle of nothing
 
 
 def best_first(
     ways: Iterable[Way], misfits: Iterable[float], tolerance: float, aligned: list[bool]
 ) -> tuple[Way, ...]:
     """Ways with their misfits, in their order of preference; misfits are compared in steps of `tolerance`."""
-    judged = [
-        replace(way, misfit=misfit, preference=_preference(way, int(min(misfit / tolerance, 1e6)), aligned))
-        for way, misfit in zip(ways, misfits)
-    ]
+    judged = []
+    for way, misfit in zip(ways, misfits):
+        steps = int(min(misfit / tolerance, 1e6)) + LAST_RESORT * (way.partners == (INSIDE,))
+        judged.append(replace(way, misfit=misfit, preference=_preference(way, steps, aligned)))
     return tuple(sorted(judged, key=lambda way: way.preference))
 
 
@@ -37,7 +39,7 @@ def grounded_order(
     cuboids  the numbers of those to be placed, in semantic order;  ways  those they have, the best first
     Raises RejectedError ("disconnected") when some cuboids have no chain of contacts to the bounding box.
     """
-    waiting, standing, chosen = list(cuboids), {BOTTOM, TOP}, []
+    waiting, standing, chosen = list(cuboids), {BOTTOM, TOP, INSIDE}, []
     own: dict[int, list[Way]] = {cuboid: [] for cuboid in waiting}
     for way in ways:
         own[way.cuboid].append(way)

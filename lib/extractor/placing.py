@@ -4,6 +4,10 @@ A way is a squeeze, two attaches, or one. Each is tried with the language's own 
 starts upright at the origin, as a program declares it, its partners stand where they belong, and the ways of all
 cuboids of a block are one batch. `misfit` is how far the cuboid's corners end up from where they should be.
 
+Where a chair stands on four splayed legs and leans on two slanted posts, every tilted part needs the seat to be turned
+right, and the seat needs them. Then the seat may be attached to a point inside the bounding box, which is always there:
+the last resort of cuboids that stand upright.
+
 A squeeze (paper, section 4) needs contacts at the centers of two opposite faces, at the same place (u, v) of the two
 partners. Its first attach decides where the cuboid stands; (u, v) of the second may differ a little.
 """
@@ -20,7 +24,7 @@ from ..interpreters.cuboids import Cuboids, concatenate
 from ..interpreters.shapeassembly.attaching import move, stretch_and_turn
 from ..interpreters.shapeassembly.growing import grow
 from ..interpreters.shapeassembly.program import FACES
-from .contacts import BBOX_REACH, BOTTOM, MIDDLE, TILTED_REACH, TOP, Contact
+from .contacts import BBOX_REACH, BOTTOM, INSIDE, MIDDLE, TILTED_REACH, TOP, Contact
 from .partgraph import stack_boxes
 from .snapping import turning_axis
 
@@ -48,7 +52,7 @@ class Way:
     """One way to hold `cuboid`: the partners in order, and for each the local points (on it, on the partner)."""
 
     cuboid: int
-    partners: tuple[int, ...]  # cuboids of the block, or BOTTOM or TOP of its box
+    partners: tuple[int, ...]  # cuboids of the block, or BOTTOM, TOP or INSIDE of its box
     points: tuple[tuple[Point, Point], ...]
     kinds: tuple[int, ...] = ()  # of the contacts
     face: str = ""  # of a squeeze
@@ -96,6 +100,9 @@ def ways_to_place(
             for first, second in pairs
             if (face := _squeezed_face(first, second))
         ]
+    if ends and not tilted:
+        place = bounding_box(size).local(boxes.center[cuboid]).clamp(0, 1).tolist()
+        ways.append(Way(cuboid, (INSIDE,), (((0.5, 0.5, 0.5), _rounded(place)),), (MIDDLE,)))
     if tilted and pairs:
         ways += [_two_attaches(cuboid, *pair) for pair in _aimed(boxes[cuboid], boxes, size, pairs)]
     return [

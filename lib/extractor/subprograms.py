@@ -14,7 +14,7 @@ from .bounding import enclosing_box, part_leaves
 from .contacts import Contact
 from .facts import BlockFacts
 from .partgraph import Part, stack
-from .symmetry import mirror_images
+from .symmetry import is_image, mirror_images
 
 
 def join_components(
@@ -32,16 +32,19 @@ def join_components(
         pairs = dict(images[axis].nonzero().tolist())
         if len(pairs) < 2:
             continue
-        found = [
-            component
-            for component in _components(list(pairs), facts.contacts)
-            if _same_partners(component, pairs, facts.contacts) and holds_together(component)
-        ]
-        if found:
-            halves = [half for c in found for half in (c, [pairs[i] for i in c])]
-            used = {i for half in halves for i in half}
-            rest = [part for i, part in enumerate(facts.parts) if i not in used]
-            return rest + [join([facts.parts[i] for i in half]) for half in halves]
+        used, joined = set(), []
+        for component in _components(list(pairs), facts.contacts):
+            image = [pairs[i] for i in component]
+            halves = [join([facts.parts[i] for i in half]) for half in (component, image)]
+            if (
+                _same_partners(component, pairs, facts.contacts)
+                and is_image(*halves, axis, alike * float(facts.size.max()))
+                and holds_together(component)
+            ):
+                used |= {*component, *image}
+                joined += halves
+        if joined:
+            return [part for i, part in enumerate(facts.parts) if i not in used] + joined
     return list(facts.parts)
 
 

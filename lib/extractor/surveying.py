@@ -8,7 +8,7 @@ from torch import Tensor
 
 from .arranging import LEVELS
 from .bounding import seen_from
-from .contacts import connecting_contacts, mark_firm
+from .contacts import connecting_contacts, floating, mark_firm
 from .errors import RejectedError
 from .facts import BlockFacts
 from .labels import RANKED
@@ -59,11 +59,17 @@ def survey(
 
 
 def look(parts: Sequence[Part], size: Float[Tensor, "3"], category: str, options: Options) -> BlockFacts:
-    """Parts of a block in order, their straightened boxes, their contacts, and every way to hold each of them."""
+    """Parts of a block in order, their straightened boxes, their contacts, and every way to hold each of them.
+
+    Raises RejectedError ("disconnected").
+    """
     parts = semantic_order(parts, category, size)
     boxes = snap(stack(parts))
     aligned = is_upright(boxes) & options.aligned_flag
     contacts = mark_firm(connecting_contacts(boxes, size), [stack(part.leaves()) for part in parts])
+    if loose := floating(len(parts), contacts):
+        names = ", ".join(parts[i].label for i in sorted(loose))
+        raise RejectedError("disconnected", f"no chain of contacts holds {names}")
     ways = [
         way
         for i, upright in enumerate(aligned.tolist())
@@ -77,8 +83,8 @@ def look(parts: Sequence[Part], size: Float[Tensor, "3"], category: str, options
 def holds_together(component: list[int], facts: BlockFacts, category: str, options: Options) -> bool:
     """Would these parts, in a block of their own, be held about as well as they are in theirs?"""
     node = join([facts.parts[i] for i in component])
-    inside = look(seen_from(node.box, node.children), node.box.size, category, options)
     try:
+        inside = look(seen_from(node.box, node.children), node.box.size, category, options)
         before = grounded_order(facts.written, facts.open_ways)
         after = grounded_order(inside.written, inside.open_ways)
     except RejectedError:

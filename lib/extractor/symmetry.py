@@ -120,11 +120,15 @@ def mirror_images(
     place = boxes.center.mT
     images &= (place[:, :, None] < -tolerance / 2) & (place[:, None] > tolerance / 2)
     for axis, i, j in images.nonzero().tolist():
-        mirror = mirrors[axis]
-        images[axis, i, j] = same_inside(
-            parts[i], parts[j], lambda c, m=mirror: c * m, tolerance, turned=True
-        )
+        images[axis, i, j] = is_image(parts[i], parts[j], axis, tolerance)
     return images
+
+
+def is_image(first: Part, second: Part, axis: int, tolerance: float) -> bool:
+    """Does `second` hold what `reflect` would make of what is in `first`?"""
+    mirror = torch.ones(3, dtype=torch.float64)
+    mirror[axis] = -1
+    return same_inside(first, second, lambda corners: corners * mirror, tolerance, turned=True)
 
 
 def find_rows(

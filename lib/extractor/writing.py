@@ -12,6 +12,7 @@ from torch import Tensor
 
 from ..interpreters.shapeassembly import Attach, Block, Cuboid, Program, Reflect, Squeeze, Translate
 from ..interpreters.shapeassembly.program import BBOX
+from .contacts import BOTTOM, INSIDE, TOP
 from .facts import BlockFacts
 from .placing import DIGITS, Way
 from .symmetry import Group
@@ -38,7 +39,7 @@ def size_digits(size: Float[Tensor, "3"]) -> int:
 
 def write_block(facts: BlockFacts, names: dict[int, str], digits: int) -> tuple:
     """The statements of one block; `names` says what its written parts are called."""
-    partner_names = {**names, -1: BBOX, -2: BBOX}
+    partner_names = {**names, **dict.fromkeys((BOTTOM, TOP, INSIDE), BBOX)}
     cuboids = [Cuboid(BBOX, sides(facts.size, digits), True)]
     cuboids += [
         Cuboid(names[i], sides(facts.boxes.size[i], digits), bool(facts.aligned[i])) for i in facts.written

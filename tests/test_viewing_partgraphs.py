@@ -27,7 +27,6 @@ from lib.viewing.partgraphs import (
     labelled,
     painted,
     painted_groups,
-    steps_of,
     tree,
     ways_chart,
     what_changed,
@@ -85,7 +84,7 @@ def test_what_changed(table):
 
 
 def test_steps_have_their_own_names(table):
-    steps = steps_of(table)
+    steps = dict(stages(table))
     assert list(steps)[0] == "input" and list(steps)[-1] == "refit" and steps["input"] is table
     assert len(steps) == len(stages(table))
 

@@ -84,7 +84,8 @@ def ways_to_place(
         for c in contacts
         if cuboid in (c.first, c.second)
     ]
-    ends = sorted(ends, key=lambda end: end.kind)[:MOST_ENDS]
+    by_bbox, by_parts = [end for end in ends if end.partner < 0], [end for end in ends if end.partner >= 0]
+    ends = by_bbox + sorted(by_parts, key=lambda end: end.kind)[:MOST_ENDS]
     ways = [Way(cuboid, (end.partner,), ((end.on_cuboid, end.on_partner),), (end.kind,)) for end in ends]
     pairs = list(permutations(ends, 2))
     ways += [_two_attaches(cuboid, first, second) for first, second in pairs]

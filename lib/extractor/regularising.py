@@ -14,22 +14,22 @@ from .soundness import sound
 def stages(graph: PartGraph, options: Options = CANONICAL) -> list[tuple[str, PartGraph]]:
     """The part graph after each step of rearranging it, by name, the input first: for looking at."""
     steps = [
-        without_slivers,
-        shorten_chains,
-        collapse,
-        flatten,
-        hold,
-        snap_leaves,
-        shorten,
-        shorten_chains,
-        limit_levels,
-        refit,
+        ("in_order", lambda graph: in_order(sound(graph))),
+        ("without_slivers", without_slivers),
+        ("shorten_chains", shorten_chains),
+        ("collapse", collapse),
+        ("flatten", flatten),
+        ("hold", hold),
+        ("flat", lambda graph: graph if options.hierarchy else flat(graph)),
+        ("snap_leaves", snap_leaves),
+        ("shorten", shorten),
+        ("shorten_chains_again", shorten_chains),
+        ("limit_levels", limit_levels),
+        ("refit", refit),
     ]
-    if not options.hierarchy:
-        steps.insert(steps.index(hold) + 1, flat)
-    graphs = [("input", graph), ("in_order", in_order(sound(graph)))]
-    for step in steps:
-        graphs.append((step.__name__, step(graphs[-1][1])))
+    graphs = [("input", graph)]
+    for name, step in steps:
+        graphs.append((name, step(graphs[-1][1])))
     return graphs
 
 

@@ -6,18 +6,20 @@ import torch
 
 from ..interpreters.cuboids import Cuboids
 from .arranging import collapse
-from .boxes import LARGEST, THINNEST
+from .boxes import AXIS_TOLERANCE, LARGEST, THINNEST
 from .errors import RejectedError
 from .nodes import MOST_LEVELS
 from .partgraph import Part, PartGraph, stack
 
-MOST_PARTS = 200  # leaves of a shape; PartNet's shapes have a tenth of that
+MOST_PARTS = 100  # leaves of a shape; a program declares at most 12, and a real one makes at most 51
 
 
 def sound(graph: PartGraph) -> PartGraph:
-    """The same graph in float64, all axes right-handed. Raises RejectedError ("unsound", "too many cuboids")."""
+    """The same graph in float64, axes right-handed. Raises RejectedError ("unsound", "empty", "too many cuboids")."""
     if _depth(graph.root) > MOST_LEVELS:
         raise RejectedError("unsound", f"more than {MOST_LEVELS} parts within parts")
+    if graph.root.is_leaf:
+        raise RejectedError("empty", "there are no parts below the root")
     leaves = [*graph.root.leaves(), *collapse(graph).root.leaves()]  # those that are, and those that will be
     if (count := len(graph.root.leaves())) > MOST_PARTS:
         raise RejectedError("too many cuboids", f"{count} parts; at most {MOST_PARTS} are looked at")
@@ -27,6 +29,9 @@ def sound(graph: PartGraph) -> PartGraph:
         raise RejectedError("unsound", f"a box has numbers that are not finite, or beyond {LARGEST:g}")
     if boxes.size.min() < THINNEST:
         raise RejectedError("unsound", f"a side of {float(boxes.size.min()):g}; at least {THINNEST:g}")
+    crooked = (boxes.axes.double() @ boxes.axes.double().mT - torch.eye(3, dtype=torch.float64)).abs().max()
+    if crooked > AXIS_TOLERANCE:
+        raise RejectedError("unsound", "a box has axes that are not at right angles, or not of length 1")
     return graph.with_root(_in_double(graph.root))
 
 

@@ -25,11 +25,11 @@ MAY_COST = 3  # steps of misfit that a sub-assembly of its own may cost its part
 
 def semantic_order(parts: Sequence[Part], category: str, size: Float[Tensor, "3"]) -> list[Part]:
     """By the label's rank, then by where the part's center is: first coarsely, then exactly (paper, section 5.2)."""
-    ranks = {label: rank for rank, label in enumerate(RANKED.get(category, ()))}
+    ranks, longest = {label: rank for rank, label in enumerate(RANKED.get(category, ()))}, float(size.max())
 
     def key(part: Part) -> tuple:
-        center = [round(x, 6) + 0.0 for x in part.box.center.tolist()]
-        coarse = [round(2 * x / float(size.max())) for x in center]
+        center = [round(x / longest, 6) + 0.0 for x in part.box.center.tolist()]
+        coarse = [round(2 * x) for x in center]
         return ranks.get(part.label, len(ranks)), sum(coarse), *coarse, *center, *part.box.size.tolist()
 
     return sorted(parts, key=key)

@@ -33,9 +33,8 @@ from .placing import Way, bounding_box
 ALIKE = 0.015  # share of the block's longest side: how far corners of a copy may lie from where they should
 ALIKE_IF_MANY = 0.03  # the same for shapes that would need too many cuboids otherwise: regular before exact
 UNEVEN = 0.1  # share of the spacing of a row: how far a member may be from its place (the authors' program)
-NEARLY_NOTHING = 1e-6  # world units
 SAME_POINT = (
-    0.1  # the same for the places where copies touch other parts (the authors' program: 0.1 of about 1)
+    0.1  # share of the block's longest side, for the places where copies touch other parts (the authors: 0.1)
 )
 
 
@@ -169,7 +168,7 @@ def even_runs(row: list[int], position: list[float], tolerance: float) -> list[l
         stop = start + 2
         while stop < len(row) and _even([position[part] for part in row[start : stop + 1]], tolerance):
             stop += 1
-        if position[row[start + 1]] - position[row[start]] > NEARLY_NOTHING:  # two at one place are no row
+        if position[row[start + 1]] - position[row[start]] > tolerance / 100:  # two at one place are no row
             runs.append(row[start:stop])
         start = stop
     return runs

@@ -33,8 +33,8 @@ def write_program(root: BlockFacts) -> Program:
 
 
 def size_digits(size: Float[Tensor, "3"]) -> int:
-    """Decimals of sizes: three for a shape of about 1 unit, fewer for larger ones, more for smaller ones."""
-    return max(0, DIGITS - round(math.log10(float(size.max()))))
+    """Decimals of sizes: three for a shape of 0.5 to 5 units, fewer for larger ones, more for smaller ones."""
+    return max(0, DIGITS - math.floor(math.log10(2 * float(size.max()))))
 
 
 def write_block(facts: BlockFacts, names: dict[int, str], digits: int) -> tuple:

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from lib.extractor import BlockFacts, Part, PartGraph, stages
+from lib.extractor import BlockFacts, Part, PartGraph
 from lib.extractor.contacts import FACE_TO_FACE, IN_FACE, MIDDLE, Contact
 from lib.extractor.partgraph import stack
 from lib.extractor.placing import Way
@@ -83,14 +83,6 @@ def by_branch(graph: PartGraph) -> list[int]:
     owners = [id(parents[id(leaf)]) for leaf in graph.root.leaves()]
     number = {owner: k for k, owner in enumerate(dict.fromkeys(owners))}
     return [number[owner] for owner in owners]
-
-
-def steps_of(graph: PartGraph) -> dict[str, PartGraph]:
-    """The stages of rearranging a part graph by name; a step that comes twice is called `… again` then."""
-    steps: dict[str, PartGraph] = {}
-    for name, after in stages(graph):
-        steps[f"{name} again" if name in steps else name] = after
-    return steps
 
 
 def inner_boxes(graph: PartGraph) -> Cuboids:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
+import jaxtyping
 import numpy as np
 import pytest
 import torch
@@ -78,9 +79,19 @@ def _time_limit(seconds: float) -> Iterator[None]:
 @pytest.fixture
 def unchecked_shapes():
     """Switches the shape checks of lib off for one test: thousands of programs, for which others check them."""
-    from jaxtyping import config
+    with unchecked():
+        yield
 
-    before = config.jaxtyping_disable
-    config.update("jaxtyping_disable", True)
-    yield
-    config.update("jaxtyping_disable", before)
+
+@contextmanager
+def unchecked() -> Iterator[None]:
+    """No shape checks for a while. Functions within functions, which are made anew at every call, are not prepared for
+    checks either."""
+    disabled, prepare = jaxtyping.config.jaxtyping_disable, jaxtyping.jaxtyped
+    jaxtyping.config.update("jaxtyping_disable", True)
+    jaxtyping.jaxtyped = lambda *_, **__: lambda function: function
+    try:
+        yield
+    finally:
+        jaxtyping.jaxtyped = prepare
+        jaxtyping.config.update("jaxtyping_disable", disabled)

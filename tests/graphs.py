@@ -2,11 +2,9 @@
 
 import math
 import random
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 
-import jaxtyping
 import torch
 
 from lib.extractor import BlockFacts, Extraction, Options, Part, PartGraph, extract_many
@@ -14,6 +12,8 @@ from lib.extractor.options import CANONICAL
 from lib.extractor.surveying import look
 from lib.furniture import make
 from lib.interpreters.cuboids import Cuboids
+
+from .conftest import unchecked
 
 CATEGORIES = ("chair", "table", "storage")
 
@@ -140,20 +140,6 @@ def extract_all(graphs, options: Options = CANONICAL) -> list[Extraction]:
     """As `extract_many`, without shape checks."""
     with unchecked():
         return extract_many(graphs, options)
-
-
-@contextmanager
-def unchecked():
-    """No shape checks for a while: as the fixture `unchecked_shapes`, and functions within functions, which are made
-    anew at every call, are not prepared for checks either: five times quicker."""
-    disabled, prepare = jaxtyping.config.jaxtyping_disable, jaxtyping.jaxtyped
-    jaxtyping.config.update("jaxtyping_disable", True)
-    jaxtyping.jaxtyped = lambda *_, **__: lambda function: function
-    try:
-        yield
-    finally:
-        jaxtyping.jaxtyped = prepare
-        jaxtyping.config.update("jaxtyping_disable", disabled)
 
 
 def text(extraction: Extraction) -> str:

@@ -2,14 +2,16 @@
 
 import random
 from functools import cache
+from itertools import permutations
 
 import numpy as np
 import pytest
 
-from lib.extractor import Options, PartGraph
+from lib.extractor import Options, PartGraph, extract
 from lib.interpreters.shapeassembly import execute_many, parse
 
-from .graphs import CATEGORIES, extract_all, extracted, furniture, shuffled, text, unchecked
+from .conftest import unchecked
+from .graphs import CATEGORIES, extract_all, extracted, furniture, graph, leaf, shuffled, text
 
 REAL = 40  # of the authors' programs, a category
 KEEP = Options(keep_rejected=True)
@@ -46,6 +48,13 @@ def test_shuffled_real_shapes(category, real):
     graphs, extractions = real[category]
     again = extract_all([shuffled(graph, seed) for seed, graph in enumerate(graphs[:15])], KEEP)
     assert [text(a) for a in again] == [text(e) for e in extractions[:15]]
+
+
+def test_ties_do_not_depend_on_the_list():
+    """Boards of equal volume that run into one another: one of them is cut, always the same one."""
+    boards = [leaf((10, 1, 10), (5, 0.5, 5)), leaf((1, 10, 10), (0.5, 5, 5)), leaf((10, 10, 1), (5, 5, 0.5))]
+    texts = {text(extract(graph(*order))) for order in permutations(boards)}
+    assert len(texts) == 1 and "Cuboid" in texts.pop()
 
 
 def test_twice():

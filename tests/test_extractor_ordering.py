@@ -5,15 +5,17 @@ from itertools import permutations
 
 import pytest
 
-from lib.extractor import Options, RejectedError, extract
-from lib.extractor.contacts import BOTTOM, TOP
+from lib.datasets import example
+from lib.extractor import Options, PartGraph, RejectedError, extract
+from lib.extractor.contacts import BOTTOM, INSIDE, TOP
 from lib.extractor.ordering import best_first, grounded_order
 from lib.extractor.placing import Way
 from lib.extractor.surveying import look
-from lib.interpreters.shapeassembly import Attach, Squeeze
+from lib.interpreters.shapeassembly import Attach, Squeeze, execute
 from lib.interpreters.shapeassembly.program import BBOX
 
-from .graphs import CATEGORIES, blocks, extracted, graph, leaf, unchecked
+from .conftest import unchecked
+from .graphs import CATEGORIES, blocks, extracted, graph, leaf
 
 
 def furniture_blocks(count: int) -> list:
@@ -48,7 +50,7 @@ def brute_force(cuboids: list[int], ways) -> int | None:
     """The least loss over all grounded orders, each cuboid held as well as its place in the order allows."""
     found = []
     for order in permutations(cuboids):
-        standing, chosen = {BOTTOM, TOP}, []
+        standing, chosen = {BOTTOM, TOP, INSIDE}, []
         for cuboid in order:
             chosen.append(
                 next((w for w in ways if w.cuboid == cuboid and standing.issuperset(w.partners)), None)
@@ -66,7 +68,7 @@ def brute_force(cuboids: list[int], ways) -> int | None:
 
 def test_every_order_is_grounded():
     for block in furniture_blocks(30):
-        standing = {BOTTOM, TOP}
+        standing = {BOTTOM, TOP, INSIDE}
         for each in block.ways:
             assert standing.issuperset(each.partners)
             standing.add(each.cuboid)
@@ -199,3 +201,12 @@ def test_islands_are_named(floating):
     extraction = extract(graph(*lamp, *stand))
     assert extraction.reason == "disconnected" and extraction.program is None
     assert all(label in extraction.detail for label in floating) and "post" not in extraction.detail
+
+
+def test_a_seat_is_hung_up_where_all_that_holds_it_is_tilted():
+    """Splayed legs and slanted posts need the seat to be turned right, and it needs them (example slanted_chair)."""
+    with unchecked():
+        found = extract(PartGraph.from_shape(execute(example("slanted_chair"))))
+    assert found.f_score > 98 and found.facts.ways[0].partners == (INSIDE,)
+    (seat,) = [way for way in found.facts.ways if way.partners == (INSIDE,)]  # nothing else hangs in the air
+    assert found.facts.aligned[seat.cuboid]

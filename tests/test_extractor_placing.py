@@ -3,15 +3,17 @@
 import pytest
 import torch
 
-from lib.extractor.contacts import BOTTOM, TOP
+from lib.extractor import RejectedError
+from lib.extractor.contacts import BOTTOM, INSIDE, TOP
 from lib.extractor.placing import APART, DIGITS, bounding_box, judge, squeeze_points, ways_to_place
 from lib.extractor.writing import attach_statements
 from lib.interpreters.shapeassembly import Attach, Block, Cuboid, Program, Squeeze, execute_many, expand
 from lib.interpreters.shapeassembly.program import FACES
 
-from .graphs import CATEGORIES, blocks, extracted, facts_of, leaf, tensor, turn, unchecked
+from .conftest import unchecked
+from .graphs import CATEGORIES, blocks, extracted, facts_of, leaf, tensor, turn
 
-NAMES = {BOTTOM: "bbox", TOP: "bbox"}
+NAMES = {BOTTOM: "bbox", TOP: "bbox", INSIDE: "bbox"}
 
 
 def program_of(block, way) -> Program:
@@ -147,9 +149,6 @@ def test_what_cannot_be_computed_is_the_worst():
     assert (judge(list(block.ways), broken, block.aligned, block.size) == torch.inf).all()
 
 
-def test_no_contacts_no_ways():
-    block = facts_of(leaf((0.1, 0.1, 0.1)))
-    assert block.ways == () and block.contacts == ()
-    assert graph(
-        leaf((1, 1, 1))
-    ).root.children  # and a leaf that fills its block has contacts: see the attacks
+def test_what_touches_nothing_is_named():
+    with pytest.raises(RejectedError, match="no chain of contacts holds lamp"):
+        facts_of(leaf((0.1, 0.1, 0.1), label="lamp"))

@@ -189,3 +189,9 @@ def test_nothing_is_left_to_shorten(unchecked_shapes):
 def test_two_boxes_through_each_other_stay():
     cross = [box((10, 1, 1)), box((1, 10, 1)), box((1, 1, 10))]
     assert bounds(*cross) == shortened(*cross)
+
+
+def test_a_thin_board_does_not_vanish_into_its_neighbour():
+    """Far thinner than what counts as inside, but it lies on the seat, not in it."""
+    veneer = between((0, 6, 0), (10, 6 + INSIDE * 10 * 0.6, 10))
+    assert shortened(veneer, SEAT) == bounds(veneer, SEAT)

@@ -210,6 +210,12 @@ def test_an_H_leg_the_other_way():
     assert "reflect(Program_1, Z)" in lines(TOP, *LEGS, *bars)
 
 
+def test_halves_that_touch_different_parts_are_not_joined():
+    """A shelf between the two legs of one side: the other side's half would be held by something else."""
+    shelf = leaf((3, 0.5, 9), (-2, 4, 0), "shelf")
+    assert len(extract(graph(TOP, *LEGS, *SIDE_BARS, shelf)).program.blocks) == 1
+
+
 def test_no_sub_assembly_without_macros():
     assert len(extract(graph(TOP, *LEGS, *SIDE_BARS), Options(macros=False)).program.blocks) == 1
 

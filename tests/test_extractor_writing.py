@@ -83,7 +83,9 @@ def test_numbers_have_three_decimals():
             assert len(number.split(".")[1]) <= 3, number
 
 
-@pytest.mark.parametrize("size, digits", [(1, 3), (3, 3), (4, 2), (0.5, 3), (0.01, 5), (500, 0), (1e6, 0)])
+@pytest.mark.parametrize(
+    "size, digits", [(1, 3), (4.9, 3), (5.1, 2), (0.51, 3), (0.01, 5), (400, 1), (500, 0), (1e6, 0)]
+)
 def test_digits_of_sizes(size, digits):
     assert size_digits(tensor([size / 3, size, size / 2])) == digits
 
@@ -95,8 +97,9 @@ def test_sizes_never_vanish():
 
 @pytest.mark.parametrize("by", [500, 1 / 500])
 def test_large_and_small_shapes(by):
-    """Nearly always the same program but for its sizes, and as good: ties are broken and sizes rounded in world units,
-    up to three times as coarsely at this scale, which costs thin parts a little of their F-score."""
+    """The same program but for its sizes, where nothing is tilted: when a tilted cuboid counts as attached the language
+    says in world units (1e-4, 0.01). And as good: sizes may be rounded up to
+    five times as coarsely at this scale, which costs thin parts a little of their F-score."""
     usual, other, same = [], [], []
     for category in CATEGORIES:
         usual += extracted(category, 8)
@@ -106,14 +109,15 @@ def test_large_and_small_shapes(by):
     for one, two in zip(usual, other, strict=True):
         assert one.reason == two.reason
         if one.program:
-            same.append(one.program.structure == two.program.structure)
+            tilted = any(not s.aligned for _, _, s in one.program.statements() if isinstance(s, Cuboid))
+            same.append(tilted or one.program.structure == two.program.structure)
             assert two.f_score == pytest.approx(one.f_score, abs=3)
             bbox, large = (
                 one.program.blocks[0].statements[0].numbers,
                 two.program.blocks[0].statements[0].numbers,
             )
             assert large == pytest.approx([side * by for side in bbox], rel=0.01)  # three digits of about 0.3
-    assert len(same) > 20 and sum(same) >= 0.8 * len(same)
+    assert len(same) > 20 and all(same)
 
 
 # What may be left out
@@ -188,9 +192,6 @@ def test_at_most_twelve_cuboids():
     assert kept.program is not None and kept.reason == "too many cuboids" and not kept.accepted
 
 
-@pytest.mark.xfail(
-    strict=True, reason="MOST_ENDS drops the floor's hold by the bounding box: it has 21 other contacts"
-)
 def test_macros_may_make_more():
     row = [leaf((0.3, 6, 0.3), (x, 3, 0)) for x in range(-10, 11)]
     extraction = extract(graph(*row, leaf((25, 1, 6), (0, -0.5, 0)), leaf((25, 1, 5), (0, 6.5, 0))))

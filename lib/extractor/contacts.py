@@ -13,6 +13,7 @@ The block's bounding box takes part as two more boxes, its top and its bottom fa
 cuboid, join points nearer than 5 % of the longest side, and average up to 50^3 more.)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -77,21 +78,11 @@ def connecting_contacts(boxes: Cuboids, size: Float[Tensor, "3"]) -> list[Contac
             return contacts
 
 
-def floating(count: int, contacts, holds: dict[int, frozenset[int]] | None = None) -> set[int]:
-    """The cuboids that no chain of contacts joins to the bounding box.
-
-    holds   for some cuboids the partners that may hold them; others are held by whatever they touch
-    """
-    holds, standing, found = holds or {}, {BOTTOM, TOP}, True
+def floating(count: int, contacts: Sequence[Contact]) -> set[int]:
+    """The cuboids that no chain of contacts joins to the bounding box."""
+    standing, found = {BOTTOM, TOP}, True
     while found:
-        found = {
-            i
-            for c in contacts
-            for i in (c.first, c.second)
-            if i not in standing
-            and c.partner(i) in standing
-            and c.partner(i) in holds.get(i, (c.partner(i),))
-        }
+        found = {i for c in contacts for i in (c.first, c.second) if c.partner(i) in standing} - standing
         standing |= found
     return set(range(count)) - standing
 

@@ -79,36 +79,39 @@ def ways_to_place(
     squeezes: bool = True,
 ) -> list[Way]:
     """Every way to hold `cuboid` by its contacts, not yet judged."""
+    ends = _ends(cuboid, contacts)
+    ways = [Way(cuboid, (end.partner,), ((end.on_cuboid, end.on_partner),), (end.kind,)) for end in ends]
+    if ends and not tilted:
+        ways.append(_last_resort(cuboid, boxes, size))
+    pairs = list(permutations(ends, 2))
+    twice = [_two_attaches(cuboid, first, second) for first, second in pairs]
+    if squeezes:
+        twice += [_squeeze(cuboid, *pair, face) for pair in pairs if (face := _squeezed_face(*pair))]
+    if tilted and pairs:
+        twice += [_two_attaches(cuboid, *pair) for pair in _aimed(boxes[cuboid], boxes, size, pairs)]
+    return ways + [way for way in twice if _distance(way.points[0][0], way.points[1][0]) >= APART]
+
+
+def _ends(cuboid: int, contacts: Sequence[Contact]) -> list[End]:
+    """The cuboid's contacts: all with the bounding box, and the best of the others."""
     ends = [
         End(c.partner(cuboid), _rounded(c.at(cuboid)), _rounded(c.at(c.partner(cuboid))), c.kind)
         for c in contacts
         if cuboid in (c.first, c.second)
     ]
     by_bbox, by_parts = [end for end in ends if end.partner < 0], [end for end in ends if end.partner >= 0]
-    ends = by_bbox + sorted(by_parts, key=lambda end: end.kind)[:MOST_ENDS]
-    ways = [Way(cuboid, (end.partner,), ((end.on_cuboid, end.on_partner),), (end.kind,)) for end in ends]
-    pairs = list(permutations(ends, 2))
-    ways += [_two_attaches(cuboid, first, second) for first, second in pairs]
-    if squeezes:
-        ways += [
-            Way(
-                cuboid,
-                (first.partner, second.partner),
-                squeeze_points(face, first.partner, second.partner, first.on_partner),
-                (first.kind, second.kind),
-                face,
-            )
-            for first, second in pairs
-            if (face := _squeezed_face(first, second))
-        ]
-    if ends and not tilted:
-        place = bounding_box(size).local(boxes.center[cuboid]).clamp(0, 1).tolist()
-        ways.append(Way(cuboid, (INSIDE,), (((0.5, 0.5, 0.5), _rounded(place)),), (MIDDLE,)))
-    if tilted and pairs:
-        ways += [_two_attaches(cuboid, *pair) for pair in _aimed(boxes[cuboid], boxes, size, pairs)]
-    return [
-        way for way in ways if len(way.points) == 1 or _distance(way.points[0][0], way.points[1][0]) >= APART
-    ]
+    return by_bbox + sorted(by_parts, key=lambda end: end.kind)[:MOST_ENDS]
+
+
+def _last_resort(cuboid: int, boxes: Cuboids, size: Float[Tensor, "3"]) -> Way:
+    """The cuboid's center attached to where it belongs in the bounding box."""
+    place = bounding_box(size).local(boxes.center[cuboid]).clamp(0, 1).tolist()
+    return Way(cuboid, (INSIDE,), (((0.5, 0.5, 0.5), _rounded(place)),), (MIDDLE,))
+
+
+def _squeeze(cuboid: int, first: End, second: End, face: str) -> Way:
+    points = squeeze_points(face, first.partner, second.partner, first.on_partner)
+    return Way(cuboid, (first.partner, second.partner), points, (first.kind, second.kind), face)
 
 
 def _two_attaches(cuboid: int, first: End, second: End) -> Way:

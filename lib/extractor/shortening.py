@@ -17,7 +17,7 @@ from .partgraph import PartGraph, stack
 
 INSIDE = 0.005  # how far outside still counts as inside: a share of the longest side of the two leaves
 OF_ITSELF = (
-    0.2  # and at most this share of the leaf's own side: a thin board does not vanish into its neighbour
+    0.2  # and at most this share of the leaf's thinnest side: a veneer does not vanish into what it lies on
 )
 WORTH_IT = 0.002  # cuts below this share of the leaf's side are left alone
 DEEPEST = 0.3  # cuts beyond this share are left alone too: a part that is half buried does not end there
@@ -79,7 +79,7 @@ def _cuts(boxes: Cuboids, others: Cuboids, same: bool = True) -> Float[Tensor, "
     step = torch.einsum("nfk,mik->nmfi", inward, others.axes).unsqueeze(3)
     half = others.size.view(1, -1, 1, 1, 3) / 2
     longest = torch.maximum(boxes.size.amax(-1)[:, None], others.size.amax(-1))[..., None]  # (n, m, 1)
-    allowed = torch.minimum(INSIDE * longest, OF_ITSELF * boxes.size[:, None, axis])  # (n, m, face)
+    allowed = torch.minimum(INSIDE * longest, OF_ITSELF * boxes.size.amin(-1)[:, None, None])  # (n, m, 1)
     inside = (q.abs() <= half + allowed[..., None, None]).all(-1).all(-1)
     # Each coordinate reaches its far side after (side - q) / step of the way.
     still = step.abs() < 1e-9 * longest[..., None, None]

@@ -2,7 +2,7 @@
 
 INPUT is a folder or zip archive of StructureNet's JSON part graphs, thousands of them. In FOLDER, afterwards:
 
-    programs/NAME.txt    the accepted programs
+    programs/NAME.txt    the accepted programs; NAME is the file's, with the folders between INPUT and it
     rejected.json        name -> reason, detail and F-score (percent) of the others
     summary.json         how many, why not, and the mean F-score of the accepted ones
     journal.jsonl        what is finished: a killed run goes on from there with the same command
@@ -223,8 +223,10 @@ def run(options: argparse.Namespace) -> int:
             f"none of {len(rows)} files gave a part graph; {rows[0]['name']}: {rows[0]['detail']}"
         )
     mean = f"mean F-score {summary['mean_f_score']}" if summary["mean_f_score"] is not None else "no F-score"
+    reasons = ", ".join(f"{count} {reason}" for reason, count in summary["rejected"].items())
     print(
         f"{summary['accepted']} of {len(rows)} accepted ({summary['accepted'] / len(rows):.1%}), {mean}, "
+        f"{f'rejected: {reasons}, ' if reasons else ''}"
         f"{count} extracted now at {speed:.1f} shapes/s; kept in {options.out}"
     )
     return 0

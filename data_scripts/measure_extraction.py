@@ -7,7 +7,7 @@
 
 For each category: accepted share, F-scores, lines and macros beside those of the original programs, reasons of
 rejection. Experiments without --only run one after the other; finished ones are kept and not run again unless --again.
-The real programs must have been fetched (python -m data_scripts.fetch_shapeassembly).
+All but furniture need the real programs (python -m data_scripts.fetch_shapeassembly); two cores take about 25 minutes.
 """
 
 import argparse
@@ -171,6 +171,20 @@ def run(experiment: str, count: int | None, workers: int) -> dict:
     return found
 
 
+def measure(experiment: str, options: argparse.Namespace) -> None:
+    """Run one experiment, print and keep its figures; unless they are there already."""
+    path = options.out / FILES[experiment].name
+    kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    if experiment in kept and not options.again:
+        counts = ", ".join(f"{found['shapes']} {category}" for category, found in kept[experiment].items())
+        print(f"{experiment}: {counts} already in {path} (--again measures again)")
+        return
+    found = run(experiment, options.count, options.workers)
+    keep(path, experiment, found)
+    for category, figures in found.items():
+        print(experiment, category, json.dumps(figures))
+
+
 def keep(path: Path, experiment: str, found: dict) -> None:
     """Put the figures into the result file, beside those of other experiments."""
     kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
@@ -195,20 +209,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder (default: results/)")
     parser.add_argument("--again", action="store_true", help="measure finished experiments again")
     options = parser.parse_args(arguments)
+    wanted = [options.only] if options.only else list(FILES)
     try:
-        for experiment in [options.only] if options.only else FILES:
-            path = options.out / FILES[experiment].name
-            if (
-                not options.again
-                and path.is_file()
-                and experiment in json.loads(path.read_text(encoding="utf-8"))
-            ):
-                print(f"{experiment}: already in {path} (--again measures it again)")
-                continue
-            found = run(experiment, options.count, options.workers)
-            keep(path, experiment, found)
-            for category, figures in found.items():
-                print(experiment, category, json.dumps(figures))
+        for experiment in wanted:
+            inputs(experiment, CATEGORIES[0], 1)  # missing data is told before hours of work, not after
+        for experiment in wanted:
+            measure(experiment, options)
     except DataError as error:
         print(error, file=sys.stderr)
         return 1

@@ -3,8 +3,11 @@
 import torch
 
 from ..extractor import PartGraph, RejectedError, extract, regularise, survey
+from ..interpreters.shapeassembly import execute
 from . import OK, UNANSWERED, hint
 from .parts import assemble, box
+
+STICKS_OUT = 0.02  # how far beyond the broken shape a mended one may reach, world units
 
 
 def loose_shelf() -> PartGraph:
@@ -51,6 +54,10 @@ def check_mended(answer: object, broken: PartGraph) -> str:
     if not extraction.accepted:
         label = new[changed[0]].label
         return hint(f"with this {label} it is still rejected: {extraction.reason} ({extraction.detail})")
+    if len(execute(extraction.program).cuboids) < len(broken.leaves):
+        return hint("it is accepted, but a part is gone: too thin to matter, or inside another one?")
+    if (answer.leaves.bounds() - broken.leaves.bounds()).abs().max() > STICKS_OUT:
+        return hint("it is accepted, but now it reaches beyond the bookcase")
     return OK
 
 
@@ -75,7 +82,9 @@ def check_groups(answer: object, graph: PartGraph) -> str:
     right = groups_of(graph)
     for group in sorted(given, key=sorted):
         if group not in right:
-            return hint(f"{set(group)} is not a group as it stands: same size? same row, or left and right?")
+            return hint(
+                f"{set(group)} is not a group as it stands: two or more of a size, in a row or left and right?"
+            )
     return (
         OK if given == right else hint(f"{len(given)} of {len(right)} groups found; what else is repeated?")
     )

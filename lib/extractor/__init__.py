@@ -6,7 +6,9 @@ extraction.program                     a canonical, validated ShapeAssembly prog
 extraction.reason                      or why there is none
 
 stages(graph)                          the part graph after each step of rearranging it
-survey(regularise(graph).root, …)      what is found out about each block: contacts, groups, order
+survey(regularise(graph).root, graph.category)     what is found out about each block: contacts, groups, order
+
+The JSON format of the files is described in `parsing`.
 """
 
 from .errors import PartGraphError, PartGraphWarning, RejectedError

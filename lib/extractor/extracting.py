@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from ..interpreters.shapeassembly import Program, ProgramError, execute_many
 from .arranging import collapse
 from .disordering import without_order
-from .errors import RejectedError
+from .errors import PartGraphError, RejectedError
 from .facts import BlockFacts
 from .options import CANONICAL, Options
 from .partgraph import PartGraph
@@ -38,6 +38,10 @@ class Extraction:
     graph: PartGraph | None = None
     facts: BlockFacts | None = None
 
+    def __repr__(self) -> str:
+        score = "" if self.f_score is None else f", F-score {self.f_score:.1f}"
+        return f"<Extraction {f'rejected: {self.reason}' if self.reason else 'accepted'}{score}>"
+
     @property
     def accepted(self) -> bool:
         return not self.reason
@@ -49,7 +53,15 @@ def extract(graph: PartGraph, options: Options = CANONICAL) -> Extraction:
 
 
 def extract_many(graphs: Sequence[PartGraph], options: Options = CANONICAL) -> list[Extraction]:
-    """Many part graphs, in order; their programs are executed as one batch. Never raises for what a graph holds."""
+    """Many part graphs, in order; their programs are executed as one batch. Never raises for what a graph holds.
+
+    Raises PartGraphError for what is no PartGraph at all.
+    """
+    for graph in graphs:
+        if not isinstance(graph, PartGraph):
+            raise PartGraphError(
+                f"found a {type(graph).__name__}", "a PartGraph, such as PartGraph.read(path)"
+            )
     written = [_written(graph, options) for graph in graphs]
     runnable = [i for i, extraction in enumerate(written) if extraction.program is not None]
     shapes = execute_many([written[i].program for i in runnable])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 class Options:
     """What an extraction may leave out: the ablations of the paper's section 7.1, and rejected programs for study.
 
-    Without macros or hierarchy a shape needs more lines: there the limit on the number of cuboids does not apply, so
+    Without macros or hierarchy a program may declare more cuboids: there the limit on their number does not apply, so
     that an ablation can be made of the same shapes.
     """
 

@@ -31,6 +31,9 @@ class Part:
     id: int = 0
     edges: tuple[dict, ...] = ()  # relations between children as the file had them; kept, not used
 
+    def __repr__(self) -> str:
+        return f"<Part {self.label}: {len(self.children)} children>"
+
     @property
     def is_leaf(self) -> bool:
         return not self.children
@@ -58,6 +61,10 @@ class PartGraph:
     root: Part
     category: str = ""
     name: str = ""
+
+    def __repr__(self) -> str:
+        name, category = self.name or "without a name", self.category or "any category"
+        return f"<PartGraph {name}: {category}, {len(self.root.leaves())} leaves>"
 
     @classmethod
     def from_shape(cls, shape: Shape, category: str = "", name: str = "") -> "PartGraph":

@@ -12,7 +12,11 @@ from .soundness import sound
 
 
 def stages(graph: PartGraph, options: Options = CANONICAL) -> list[tuple[str, PartGraph]]:
-    """The part graph after each step of rearranging it, by name, the input first: for looking at."""
+    """(name, part graph) after each step of rearranging it, the input first: for looking at.
+
+    input, in_order, without_slivers, shorten_chains, collapse, flatten, hold, flat (only if options.hierarchy is
+    off), snap_leaves, shorten, shorten_chains_again, limit_levels, refit. Raises RejectedError.
+    """
     steps = [
         ("in_order", lambda graph: in_order(sound(graph))),
         ("without_slivers", without_slivers),
@@ -20,7 +24,7 @@ def stages(graph: PartGraph, options: Options = CANONICAL) -> list[tuple[str, Pa
         ("collapse", collapse),
         ("flatten", flatten),
         ("hold", hold),
-        ("flat", lambda graph: graph if options.hierarchy else flat(graph)),
+        *([] if options.hierarchy else [("flat", flat)]),
         ("snap_leaves", snap_leaves),
         ("shorten", shorten),
         ("shorten_chains_again", shorten_chains),

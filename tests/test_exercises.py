@@ -169,6 +169,12 @@ def test_mended():
     assert extract(broken).reason == "disconnected"
     assert check_mended(with_box(broken, 6, (0, 0.85, 0), whole), broken) == "ok"
     assert check_mended(with_box(broken, 6, center=(0.18, 0.85, 0)), broken) == "ok"
+    for vanishing in (
+        with_box(broken, 6, size=(0.6, 0.0005, 0.36)),
+        with_box(broken, 6, center=(0.05, 1.18, 0)),
+    ):
+        assert "a part is gone" in check_mended(vanishing, broken)
+    assert "beyond the bookcase" in check_mended(with_box(broken, 6, size=(2, 0.03, 0.36)), broken)
     assert "0 boxes differ" in check_mended(broken, broken)
     assert "2 boxes differ" in check_mended(
         with_box(with_box(broken, 6, size=whole), 5, size=(1, 1, 1)), broken

@@ -224,3 +224,15 @@ def test_random_clouds(seed, time_limit):
             graphs.append(graph(node("a", *parts[:2]), node("b", *parts[-2:]), *parts[2:-2]))
         for extraction in extract_many(graphs, Options(keep_rejected=True)):
             assert extraction.reason in ("", *REASONS)
+
+
+def test_what_is_no_part_graph_is_named(unchecked_shapes):
+    with pytest.raises(PartGraphError, match="found a str; expected a PartGraph"):
+        extract("43875.json")
+
+
+def test_graphs_and_extractions_are_shown_in_a_line():
+    found = extract(graph(leaf((1, 1, 1)), leaf((1, 1, 1), (0, 1, 0))))
+    assert repr(found) == "<Extraction accepted, F-score 100.0>"
+    assert repr(extract(graph(leaf((0, 0, 0))))) == "<Extraction rejected: unsound>"
+    assert repr(found.graph) == "<PartGraph without a name: any category, 2 leaves>"

@@ -44,20 +44,27 @@ class DataError(RuntimeError):
     """Data that is missing, damaged or unknown. The message is one line that says what to do."""
 
 
-class ProgramSet(Sequence):
-    """Programs in a fixed order, parsed when first asked for. `ids[i]` names program i; a slice is a ProgramSet."""
+class DataSet(Sequence):
+    """Items in a fixed order, read or made when first asked for. `ids[i]` names item i; a slice is a set of its kind."""
 
-    def __init__(self, ids: Iterable[str], load: Callable[[str], Program], source: str, name: str):
+    def __init__(self, ids: Iterable[str], load: Callable[[str], object], source: str, name: str):
         self.ids, self.source, self.name = tuple(ids), source, name
-        self._load = load  # id -> Program; raises DataError
+        self._load = load  # id -> item
 
     def __len__(self) -> int:
         return len(self.ids)
 
     def __getitem__(self, index):
         if isinstance(index, slice):
-            return ProgramSet(self.ids[index], self._load, self.source, self.name)
+            return type(self)(self.ids[index], self._load, self.source, self.name)
         return self._load(self.ids[index])
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.describe()}>"
+
+
+class ProgramSet(DataSet):
+    """Programs; asking for one that is damaged raises DataError."""
 
     def describe(self) -> str:
         """One sentence: how many programs, of what, and where they come from."""
@@ -68,8 +75,15 @@ class ProgramSet(Sequence):
             "(fetch the real ones with: python -m data_scripts.fetch_shapeassembly)."
         )
 
-    def __repr__(self) -> str:
-        return f"<ProgramSet: {self.describe()}>"
+
+class GraphSet(DataSet):
+    """Part graphs; asking for one that is damaged raises PartGraphError."""
+
+    def describe(self) -> str:
+        """One sentence: how many part graphs, of what, and where they come from."""
+        if self.source == "real":
+            return f"{len(self)} {self.name} part graphs of PartNet."
+        return f"{len(self)} {self.name} part graphs of the furniture maker (see lib.furniture)."
 
 
 def data_root() -> Path:
@@ -104,31 +118,6 @@ def shapeassembly(category: str | None = None, split: str | None = None) -> Prog
         return _read(files[program_id])
 
     return ProgramSet(files, load, "real", name)
-
-
-class GraphSet(Sequence):
-    """Part graphs in a fixed order, read or made when asked for. `ids[i]` names graph i; a slice is a GraphSet."""
-
-    def __init__(self, ids: Iterable[str], load: Callable[[str], PartGraph], source: str, category: str):
-        self.ids, self.source, self.category = tuple(ids), source, category
-        self._load = load  # id -> PartGraph; raises PartGraphError
-
-    def __len__(self) -> int:
-        return len(self.ids)
-
-    def __getitem__(self, index):
-        if isinstance(index, slice):
-            return GraphSet(self.ids[index], self._load, self.source, self.category)
-        return self._load(self.ids[index])
-
-    def describe(self) -> str:
-        """One sentence: how many part graphs, of what, and where they come from."""
-        if self.source == "real":
-            return f"{len(self)} {self.category} part graphs of PartNet."
-        return f"{len(self)} {self.category} part graphs of the furniture maker (see lib.furniture)."
-
-    def __repr__(self) -> str:
-        return f"<GraphSet: {self.describe()}>"
 
 
 def part_graphs(category: str) -> GraphSet:

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from lib.extractor import PartGraph, PartGraphError
+from lib.extractor import PartGraphError
 from lib.extractor.files import load as load_graph
 from lib.extractor.files import sources
 from lib.furniture import make
@@ -45,7 +45,7 @@ class DataError(RuntimeError):
 
 
 class DataSet(Sequence):
-    """Items in a fixed order, read or made when first asked for. `ids[i]` names item i; a slice is a set of its kind."""
+    """Items in a fixed order, read or made when asked for. `ids[i]` names item i; a slice is a set of its kind."""
 
     def __init__(self, ids: Iterable[str], load: Callable[[str], object], source: str, name: str):
         self.ids, self.source, self.name = tuple(ids), source, name

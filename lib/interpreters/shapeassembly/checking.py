@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
-from .errors import ProgramError, quoted
+from ..quoting import quoted
+from .errors import ProgramError
 from .parsing import Source, is_name
 from .program import AXES, BBOX, FACES, Attach, Block, Cuboid, Reflect, Squeeze, Statement, Translate
 

@@ -1,12 +1,5 @@
 """The one exception of the ShapeAssembly language."""
 
-_LONGEST = 40  # characters of a token that a message quotes
-
-
-def quoted(token: str) -> str:
-    """A token for a message: in quotes, odd characters escaped, long ones cut."""
-    return repr(token if len(token) <= _LONGEST else token[: _LONGEST - 1] + "…")
-
 
 class ProgramError(ValueError):
     """A program that cannot be read or run.

@@ -4,7 +4,8 @@ import math
 import re
 from dataclasses import dataclass
 
-from .errors import ProgramError, quoted
+from ..quoting import quoted
+from .errors import ProgramError
 from .program import (
     AXES,
     FACES,

@@ -10,7 +10,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from ..cuboids import Cuboids
-from .errors import ProgramError, quoted
+from ..quoting import quoted
+from .errors import ProgramError
 from .hierarchy import Layout
 from .program import Program
 

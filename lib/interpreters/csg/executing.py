@@ -1,0 +1,80 @@
+"""Program -> shape, one or a batch of any structures."""
+
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Int
+from torch import Tensor
+
+from ..quoting import quoted
+from .errors import ProgramError
+from .machine import run
+from .program import LONGEST, STOP, Primitive, Program
+from .shape import Shape, Shapes
+from .vocabulary import Vocabulary, vocabulary_of
+
+
+def execute(program: Program) -> Shape:
+    """The shape of one program: a picture in the plane, a grid of voxels in space."""
+    return execute_many([program])[0]
+
+
+def execute_many(
+    programs: Sequence[Program] | Int[Tensor, "programs length"],
+    vocabulary: Vocabulary | None = None,
+    dimensions: int | None = None,
+    device: torch.device | str | None = None,
+) -> Shapes:
+    """The shapes of many programs, in order, `shapes.valid` telling which of them were programs at all.
+
+    programs    Programs of one dimension with any primitives; or what networks write: tokens, each row a program in the
+                given vocabulary that ends at the first `$`. Rows that are not valid make blank shapes.
+    vocabulary  what the tokens mean: that of the plane, or of `dimensions` (2 or 3), if left out.
+    device      where to compute: that of the tokens, if left out.
+    Raises ProgramError for Programs of both dimensions, and for numbers that are no tokens.
+    """
+    if isinstance(programs, Tensor):
+        tokens, vocabulary = programs, vocabulary or vocabulary_of(dimensions or 2)
+        _check(tokens, vocabulary)
+    else:
+        tokens, vocabulary = _spell(list(programs), dimensions)
+    device = tokens.device if device is None else torch.device(device)
+    tokens = tokens.to(device, torch.int64)
+    words, valid = run(tokens, vocabulary.canvases(device))
+    return Shapes(words, valid, tokens, vocabulary)
+
+
+def _check(tokens: Tensor, vocabulary: Vocabulary) -> None:
+    """Raises ProgramError, naming row and place, for what cannot be tokens."""
+    if tokens.ndim != 2 or tokens.is_floating_point() or tokens.is_complex() or tokens.dtype == torch.bool:
+        found = f"the tokens are a tensor {tuple(tokens.shape)} of {tokens.dtype}"
+        raise ProgramError(found, expected="whole numbers (programs, length)")
+    if tokens.shape[1] > LONGEST:
+        raise ProgramError(f"the programs have {tokens.shape[1]} tokens", expected=f"at most {LONGEST}")
+    if not tokens.numel() or (tokens.min() >= 0 and tokens.max() <= vocabulary.stop):
+        return
+    row, place = ((tokens < 0) | (tokens > vocabulary.stop)).nonzero()[0].tolist()
+    token = str(tokens[row, place].item())
+    expected = f"0 to {vocabulary.stop}, where {vocabulary.stop} is {STOP}"
+    raise ProgramError(f"{token} is not a token, in program {row}", place, token, expected)
+
+
+def _spell(programs: list[Program], dimensions: int | None) -> tuple[Tensor, Vocabulary]:
+    """The programs' tokens, in a vocabulary of the primitives that they have."""
+    for place, program in enumerate(programs):
+        if not isinstance(program, Program):
+            raise ProgramError(
+                f"item {place} is a {type(program).__name__}", expected="a Program, see parse(text)"
+            )
+    primitives: dict[Primitive, None] = {}
+    for program in programs:
+        primitives |= dict.fromkeys(program.primitives)
+    worlds = {primitive.dimensions for primitive in primitives} | ({dimensions} if dimensions else set())
+    if len(worlds) > 1:
+        mixed = next(p for p in programs if p.dimensions != (dimensions or programs[0].dimensions))
+        found = f"programs of the plane and of space together, such as {quoted(mixed.to_text())}"
+        raise ProgramError(found, token=mixed.to_text(), expected="one dimension in a batch")
+    vocabulary = Vocabulary(primitives, *worlds)
+    length = max(map(len, programs), default=0)
+    rows = [program.tokens(vocabulary, length) for program in programs]
+    return torch.stack(rows) if rows else torch.zeros((0, 0), dtype=torch.int64), vocabulary

@@ -1,0 +1,117 @@
+"""The tokens that networks write: primitives on a coarse grid, the three operations, and `$`.
+
+A token is an index: first the primitives, then `+`, `*`, `-`, `$`. The vocabulary of the plane has 400 tokens, that of
+space 6,635. By rule (Sharma et al. 2018, section 4.1: centers 8:8:56, sizes 8:4:32, completely on the canvas):
+
+    plane   every corner of circle, square, triangle, rounded as when drawn, lies in 0..63: 91 + 169 + 136 = 396
+    space   sphere r <= x,y,z <= 64 - r;  cube s/2 <= x,y,z < 64 - s/2;  cylinder r <= x,y <= 64 - r and
+            h/2 <= z < 64 - h/2: 649 + 1,341 + 4,641 = 6,631
+
+The rule of the plane gives the authors' own list. Their list of space is not public: its rule is inferred from the
+number 6,631. Primitives are sorted as the authors sort theirs: as strings, those of space without their first letter.
+"""
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+from itertools import product
+
+import torch
+from jaxtyping import Int
+from torch import Tensor
+
+from ..quoting import quoted
+from .errors import ProgramError
+from .packing import SIDE
+from .primitives import KINDS, Primitive, draw, triangle_corners
+from .program import OPERATIONS, STOP, Operation, Program, check
+
+CENTERS, SIZES = range(8, 57, 8), range(8, 33, 4)
+
+
+class Vocabulary:
+    """Distinct primitives of one dimension, numbered from 0, and after them `+ * - $`."""
+
+    def __init__(self, primitives: Iterable[Primitive], dimensions: int = 2):
+        """dimensions: 2 or 3, of a vocabulary without primitives; else theirs."""
+        self.primitives = tuple(primitives)
+        self.texts = (*map(str, self.primitives), *OPERATIONS, STOP)
+        self.dimensions = max((p.dimensions for p in self.primitives), default=dimensions)
+        self._indices = {text: index for index, text in enumerate(self.texts)}
+        self._canvases: dict[torch.device, Tensor] = {}
+
+    def __len__(self) -> int:
+        """How many tokens: the primitives and four more."""
+        return len(self.texts)
+
+    def __repr__(self) -> str:
+        return f"Vocabulary({len(self.primitives)} primitives + {' '.join((*OPERATIONS, STOP))})"
+
+    @property
+    def stop(self) -> int:
+        """The token `$`."""
+        return len(self.texts) - 1
+
+    def index(self, text: str, place: int | None = None) -> int:
+        """The token of a text such as "c(32,32,8)" or "+". Raises ProgramError; `place` is where it stood."""
+        if text not in self._indices:
+            found = f"{quoted(text)} is not among the {len(self)} tokens of the vocabulary"
+            raise ProgramError(found, place, text, f"one such as {self.texts[0]} or {self.texts[-2]}")
+        return self._indices[text]
+
+    def canvases(self, device: torch.device | str = "cpu") -> Int[Tensor, "primitives lines"]:
+        """Every primitive drawn, kept for the next time (200 KB for the vocabulary of the plane, 217 MB for space)."""
+        device = torch.device(device)
+        if device not in self._canvases:
+            self._canvases[device] = draw(self.primitives, self.dimensions, device)
+        return self._canvases[device]
+
+    def program(self, tokens: Sequence[int] | Int[Tensor, " tokens"]) -> Program:
+        """The program that indices spell, up to the first `$`. Raises ProgramError for what is no program."""
+        indices = tokens.tolist() if isinstance(tokens, Tensor) else list(tokens)
+        if self.stop in indices:
+            indices = indices[: indices.index(self.stop)]
+        statements = []
+        for place, index in enumerate(indices):
+            if not 0 <= index < self.stop:
+                expected = f"0 to {self.stop}, where {self.stop} is {STOP}"
+                raise ProgramError(f"{index} is not a token", place, str(index), expected)
+            operation = index >= len(self.primitives)
+            statements.append(Operation(self.texts[index]) if operation else self.primitives[index])
+        check(statements)
+        return Program(tuple(statements))
+
+
+@cache
+def vocabulary_of(dimensions: int) -> Vocabulary:
+    """The networks' vocabulary of the plane (2) or of space (3). Raises ValueError for another number."""
+    if dimensions not in (2, 3):
+        raise ValueError(f"found {dimensions} dimensions; expected 2 or 3")
+    kinds = [kind for kind in KINDS.values() if kind.dimensions == dimensions]
+    grid = (
+        Primitive(kind.letters, numbers)
+        for kind in kinds
+        for numbers in product(*(CENTERS if field in "xyz" else SIZES for field in kind.fields))
+    )
+    return Vocabulary(sorted(filter(_fits, grid), key=lambda p: str(p)[dimensions - 2 :]))
+
+
+def _fits(primitive: Primitive) -> bool:
+    """Does the rule above hold?"""
+    *center, size = primitive.numbers if primitive.kind != "cy" else primitive.numbers[:4]
+    if primitive.kind == "c":
+        return all(size <= k < SIDE - size for k in center)
+    if primitive.kind == "s":
+        half = 1.412 * size / 2
+        return all(int(k - half) >= 0 and int(k + half) < SIDE for k in center)
+    if primitive.kind == "t":
+        corners = torch.stack(triangle_corners(torch.tensor(primitive.numbers)))
+        return bool(((corners >= 0) & (corners < SIDE)).all())
+    if primitive.kind == "cu":
+        return all(size / 2 <= k < SIDE - size / 2 for k in center)
+    round_in = center if primitive.kind == "sp" else center[:2]
+    standing = primitive.kind == "sp" or _stands(center[2], primitive.numbers[4])
+    return all(size <= k <= SIDE - size for k in round_in) and standing
+
+
+def _stands(z: int, height: int) -> bool:
+    return height / 2 <= z < SIDE - height / 2

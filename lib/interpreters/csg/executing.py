@@ -33,39 +33,45 @@ def execute_many(
     device      where to compute: that of the tokens, if left out.
     Raises ProgramError for Programs of both dimensions, and for numbers that are no tokens.
     """
+    if dimensions not in (None, 2, 3):
+        raise ValueError(f"found {dimensions} dimensions; expected 2 or 3")
     if isinstance(programs, Tensor):
-        tokens, vocabulary = programs, vocabulary or vocabulary_of(dimensions or 2)
-        _check(tokens, vocabulary)
+        vocabulary = vocabulary or vocabulary_of(dimensions or 2)
+        tokens = _checked(programs, vocabulary)
     else:
         tokens, vocabulary = _spell(list(programs), dimensions)
     device = tokens.device if device is None else torch.device(device)
     tokens = tokens.to(device, torch.int64)
+    if not tokens.shape[1]:  # nothing but empty programs
+        tokens = tokens.new_full((len(tokens), 1), vocabulary.stop)
     words, valid = run(tokens, vocabulary.canvases(device))
     return Shapes(words, valid, tokens, vocabulary)
 
 
-def _check(tokens: Tensor, vocabulary: Vocabulary) -> None:
-    """Raises ProgramError, naming row and place, for what cannot be tokens."""
+def _checked(tokens: Tensor, vocabulary: Vocabulary) -> Int[Tensor, "programs length"]:
+    """The tokens as int64. Raises ProgramError, naming row and place, for what cannot be tokens."""
     if tokens.ndim != 2 or tokens.is_floating_point() or tokens.is_complex() or tokens.dtype == torch.bool:
         found = f"the tokens are a tensor {tuple(tokens.shape)} of {tokens.dtype}"
         raise ProgramError(found, expected="whole numbers (programs, length)")
     if tokens.shape[1] > LONGEST:
         raise ProgramError(f"the programs have {tokens.shape[1]} tokens", expected=f"at most {LONGEST}")
+    if not vocabulary.primitives:
+        raise ProgramError("the vocabulary has no primitives", expected="one or more")
+    tokens = tokens.long()  # before comparing: 399 does not fit 8 bits
     if not tokens.numel() or (tokens.min() >= 0 and tokens.max() <= vocabulary.stop):
-        return
+        return tokens
     row, place = ((tokens < 0) | (tokens > vocabulary.stop)).nonzero()[0].tolist()
     token = str(tokens[row, place].item())
     expected = f"0 to {vocabulary.stop}, where {vocabulary.stop} is {STOP}"
-    raise ProgramError(f"{token} is not a token, in program {row}", place, token, expected)
+    raise ProgramError(f"{quoted(token)} is not a token, in program {row}", place, token, expected)
 
 
 def _spell(programs: list[Program], dimensions: int | None) -> tuple[Tensor, Vocabulary]:
     """The programs' tokens, in a vocabulary of the primitives that they have."""
     for place, program in enumerate(programs):
         if not isinstance(program, Program):
-            raise ProgramError(
-                f"item {place} is a {type(program).__name__}", expected="a Program, see parse(text)"
-            )
+            expected = "a Program, see parse(text), or all tokens in one torch tensor"
+            raise ProgramError(f"item {place} is a {type(program).__name__}", expected=expected)
     primitives: dict[Primitive, None] = {}
     for program in programs:
         primitives |= dict.fromkeys(program.primitives)

@@ -3,75 +3,105 @@
 An operation of a program takes what the last two finished parts of it left. Which parts those are depends on the tokens
 alone, so they are found first, without any picture (`plan`). Then the pictures are computed in rounds: all unions whose
 operands are primitives, all intersections, all subtractions; then all operations on their results, and so on. A round
-is one bitwise operation over the stacked canvases of all programs of the batch (`run`). A canvas is a row of 64-bit
+is one bitwise operation over the stacked canvases of all programs of the batch (`compute`). A canvas is a row of 64-bit
 words; the machine does not know how many, nor what is drawn on them, so plane and space are the same to it.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
 
-LEVEL_BITS = 10  # a level, that is how deep operations are nested, is below 1,024
+_LEVEL_BITS = 10  # how deep operations are nested is below 1,024, because programs are not longer
+_LEVEL = (1 << _LEVEL_BITS) - 1
 _WORKSPACE = {
-    "cpu": 1 << 19,
+    "cpu": 1 << 20,
     "cuda": 1 << 27,
 }  # words worked on in one go: what a core's cache holds, or a GPU
-_PLANNED = 1 << 14  # programs whose operands are found in one go
 _UNION, _INTERSECT, _SUBTRACT, _STOP = range(4)  # how tokens go on after the primitives
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Which pictures the operations of a batch take. Rows are places in the programs, columns are programs.
+    """Which pictures the operations of a batch take, sorted so that a round's operations stand together.
 
-    A picture is named by a number: below `primitives` it is that primitive, from there on the result at a place of
-    the same program.
+    Every picture has a number: a primitive its own, from 0; what place t of program b makes, primitives + t * programs
+    + b. Where b is not a valid program there are no operations, and the result is -1.
     """
 
-    primitives: int
-    left: Int[Tensor, "length programs"]
-    right: Int[Tensor, "length programs"]
-    round: Int[
-        Tensor, "length programs"
-    ]  # 3 * level + operation; 0 where a program has no operation to carry out
+    makes: Int[Tensor, " operations"]
+    left: Int[Tensor, " operations"]
+    right: Int[Tensor, " operations"]
+    rounds: list[
+        tuple[int, int]
+    ]  # (0 union, 1 intersect or 2 subtract, how many), in the order of the operations
     result: Int[Tensor, " programs"]
-    valid: Bool[Tensor, " programs"]
-
-    def part(self, start: int, stop: int) -> "Plan":
-        """The plan of some of the programs."""
-        left, right, rounds = (each[:, start:stop] for each in (self.left, self.right, self.round))
-        return Plan(self.primitives, left, right, rounds, self.result[start:stop], self.valid[start:stop])
 
 
-def plan(tokens: Int[Tensor, "programs length"], primitives: int) -> Plan:
+def plan(tokens: Int[Tensor, "length programs"], primitives: int) -> Plan:
     """Find every operation's operands, and which programs are valid. Tokens: primitives, then + * - and stop."""
-    programs, length = tokens.shape
-    depth = torch.zeros(programs, dtype=torch.int64, device=tokens.device)
-    ended = torch.zeros_like(depth, dtype=torch.bool)
-    valid = ~ended
-    stack = depth.new_zeros(
-        (length // 2 + 3, programs)
-    )  # each entry: picture and level, the latter in the low bits
-    latest = stack[0]
-    left, right, rounds = depth.new_zeros((3, length, programs))
-    level_of = (1 << LEVEL_BITS) - 1
-    for place, token in enumerate(tokens.t().contiguous()):
-        ended = ended | (token == primitives + _STOP)
-        draws = token < primitives
-        depth = depth + torch.where(ended, 0, torch.where(draws, 1, -1))
-        valid = valid & (ended | (depth > 0))
-        top = (depth - 1).clamp_(0, len(stack) - 1).unsqueeze(0)
-        below = stack.gather(0, top)[0]  # for an operation: the entry under the latest, which it will replace
-        level = torch.maximum(below & level_of, latest & level_of) + 1
-        left[place], right[place] = below >> LEVEL_BITS, latest >> LEVEL_BITS
-        rounds[place] = torch.where(draws | ended, 0, 3 * level + token - primitives)
-        entry = torch.where(draws, token << LEVEL_BITS, (primitives + place << LEVEL_BITS) + level)
-        latest = torch.where(ended, latest, entry)
-        stack.scatter_(0, top, torch.where(ended, below, entry).unsqueeze(0))
-    valid = valid & (depth == 1)
-    return Plan(primitives, left, right, rounds * valid, latest >> LEVEL_BITS, valid)
+    length, programs = tokens.shape
+    draws, operates, depth, valid = _stack_depths(tokens, primitives)
+    top = (depth - 1).clamp_(min=0).long()
+    number = primitives + torch.arange(length * programs, device=tokens.device).view(length, programs)
+    entry = (
+        torch.where(draws, tokens, number) << _LEVEL_BITS
+    )  # of the stack: picture and, in the low bits, its level
+    stack = entry.new_zeros((length // 2 + 3, programs))
+    latest, lefts, rights, levels = stack[0], [], [], []
+    for at, draw, operate, new in zip(top.split(1), draws.unbind(), operates.unbind(), entry.unbind()):
+        below = stack.gather(0, at)[
+            0
+        ]  # an operation replaces two entries: the latest, and the one it finds on top
+        level = torch.maximum(below & _LEVEL, latest & _LEVEL).add_(1)
+        lefts.append(below), rights.append(latest), levels.append(level)
+        latest = torch.where(draw, new, torch.where(operate, new + level, below))
+        stack.scatter_(0, at, latest.unsqueeze(0))
+    result = torch.where(valid, latest >> _LEVEL_BITS, -1)
+    operation = (operates & valid).flatten().nonzero().squeeze(1)
+    level, kind = (
+        each.index_select(0, operation) for each in (torch.cat(levels), tokens.flatten() - primitives)
+    )
+    round_of, order = (3 * level + kind).sort()
+    operation = operation.index_select(0, order)
+    kinds, many = (each.tolist() for each in round_of.unique_consecutive(return_counts=True))
+    left, right = (torch.cat(each).index_select(0, operation) >> _LEVEL_BITS for each in (lefts, rights))
+    return Plan(primitives + operation, left, right, [(k % 3, n) for k, n in zip(kinds, many)], result)
+
+
+def _stack_depths(tokens: Tensor, primitives: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Which places draw, which operate, how many pictures wait after each (at most what memory has), who is valid."""
+    running = tokens != primitives + _STOP
+    for before, here in pairwise(running.unbind()):
+        here &= before
+    draws, operates = running & (tokens < primitives), running & (tokens >= primitives)
+    depth = draws.short() - operates.short()
+    for before, here in pairwise(depth.unbind()):
+        here += before
+    valid = ((depth > 0) | ~running).all(0)
+    return draws, operates, depth.clamp_(max=len(tokens) // 2 + 2), valid & (depth[-1] == 1)
+
+
+def compute(
+    plan: Plan, row: Int[Tensor, " pictures"], workspace: Int[Tensor, "rows words"], start: int
+) -> None:
+    """Carry out a plan: round after round, each on rows of one workspace.
+
+    workspace  holds the primitives' canvases in rows before `start`; results are written from there on.
+    row        where in the workspace each picture of the plan stands; filled in for the results.
+    """
+    stop = start + len(plan.makes)
+    row[plan.makes] = torch.arange(start, stop, device=row.device)
+    sizes = [many for _, many in plan.rounds]
+    rooms = (each.split(sizes) for each in (row[plan.left], row[plan.right], workspace[start:stop]))
+    for (kind, _), left, right, room in zip(plan.rounds, *rooms):
+        a, b = workspace.index_select(0, left), workspace.index_select(0, right)
+        if kind == _UNION:
+            torch.bitwise_or(a, b, out=room)
+        else:
+            torch.bitwise_and(a, b.bitwise_not_() if kind == _SUBTRACT else b, out=room)
 
 
 def run(
@@ -79,58 +109,27 @@ def run(
 ) -> tuple[Int[Tensor, "programs words"], Bool[Tensor, " programs"]]:
     """Each program's picture, and which programs are valid; the others' pictures are blank.
 
-    Tokens count the canvases from 0; after them come + * - and the stop, which ends a program.
+    Tokens count the canvases from 0; after them come + * - and the stop, which ends a program. The length is at least 1.
     """
-    (programs, length), words = tokens.shape, canvases.shape[1]
+    (programs, length), (primitives, words) = tokens.shape, canvases.shape
+    device = canvases.device
     pictures = canvases.new_empty((programs, words))
-    valid = torch.empty(programs, dtype=torch.bool, device=canvases.device)
-    step = max(1, _WORKSPACE[canvases.device.type] // (words * max(1, length // 2)))
-    for first in range(0, programs, _PLANNED):
-        planned = plan(tokens[first : first + _PLANNED], len(canvases))
-        valid[first : first + _PLANNED] = planned.valid
-        for start in range(0, len(planned.valid), step):
-            part = planned.part(start, start + step)
-            _compute(part, canvases, out=pictures[first + start : first + start + len(part.valid)])
+    valid = torch.empty(programs, dtype=torch.bool, device=device)
+    step = max(1, min(programs, _WORKSPACE[device.type] // (words * max(1, length // 2))))
+    workspace = canvases.new_empty((1 + min(primitives, step * length) + step * (length // 2), words))
+    workspace[0] = 0
+    for begin in range(0, programs, step):
+        some = tokens[begin : begin + step].t().contiguous()
+        planned = plan(some, primitives)
+        drawn = torch.zeros(primitives + 4, dtype=torch.bool, device=device)
+        drawn[some.flatten()] = True
+        drawn = drawn[:primitives].nonzero().squeeze(1)
+        start = 1 + len(drawn)
+        torch.index_select(canvases, 0, drawn, out=workspace[1:start])
+        row = drawn.new_empty(primitives + some.numel())
+        row[drawn] = torch.arange(1, start, device=device)
+        compute(planned, row, workspace, start)
+        valid[begin : begin + step] = planned.result >= 0
+        result = torch.where(planned.result < 0, 0, row[planned.result])  # row 0 is blank
+        torch.index_select(workspace, 0, result, out=pictures[begin : begin + step])
     return pictures, valid
-
-
-def _compute(part: Plan, canvases: Tensor, out: Tensor) -> None:
-    """Carry out a plan: round after round, each on rows of one workspace."""
-    operations = part.round.flatten().nonzero().squeeze(1)
-    rounds = part.round.flatten()[operations]
-    rounds, order = rounds.sort(stable=True)
-    operations = operations[order]
-    program = operations % len(part.valid)
-    left = _address(part, part.left.flatten()[operations], program)
-    right = _address(part, part.right.flatten()[operations], program)
-    result = _address(part, part.result, torch.arange(len(part.valid), device=out.device))
-    result = torch.where(part.valid, result, 0)
-
-    drawn = torch.zeros(part.primitives, dtype=torch.bool, device=out.device)
-    for addresses in (left, right, result):
-        drawn[addresses[addresses < part.primitives]] = True
-    drawn = drawn.nonzero().squeeze(1)
-    workspace = out.new_empty((len(drawn) + len(operations), out.shape[1]))
-    torch.index_select(canvases, 0, drawn, out=workspace[: len(drawn)])
-    row = left.new_zeros(part.primitives + part.round.numel())  # of the workspace, for each address
-    row[drawn] = torch.arange(len(drawn), device=out.device)
-    row[part.primitives + operations] = torch.arange(len(drawn), len(workspace), device=out.device)
-
-    left, right, start = row[left], row[right], len(drawn)
-    for kind, many in zip(*(each.tolist() for each in rounds.unique_consecutive(return_counts=True))):
-        stop = start + many
-        a = workspace.index_select(0, left[start - len(drawn) : stop - len(drawn)])
-        b = workspace.index_select(0, right[start - len(drawn) : stop - len(drawn)])
-        if kind % 3 == _UNION:
-            torch.bitwise_or(a, b, out=workspace[start:stop])
-        else:
-            torch.bitwise_and(a, b.bitwise_not_() if kind % 3 == _SUBTRACT else b, out=workspace[start:stop])
-        start = stop
-    torch.index_select(workspace, 0, row[result], out=out)
-    out[~part.valid] = 0
-
-
-def _address(part: Plan, pictures: Tensor, program: Tensor) -> Tensor:
-    """Primitives keep their number; results are numbered after them, through all programs of the part."""
-    places = pictures - part.primitives
-    return torch.where(places < 0, pictures, part.primitives + places * len(part.valid) + program)

@@ -5,6 +5,7 @@ A canvas is a row of words, one a line: 64 words for a 64 x 64 picture (a line i
 `a | b` on int64 tensors unites 64 pixels at once.
 """
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
@@ -33,8 +34,6 @@ def unpack(words: Int[Tensor, "*lines"]) -> Bool[Tensor, "*lines 64"]:
 
 
 def count(words: Int[Tensor, "*batch lines"]) -> Int[Tensor, "*batch"]:
-    """How many pixels of each canvas are ON: sums of neighbouring bits, then of pairs, of fours, of bytes."""
-    pairs = words - (words >> 1 & 0x5555555555555555)
-    fours = (pairs & 0x3333333333333333) + (pairs >> 2 & 0x3333333333333333)
-    bytes_ = fours + (fours >> 4) & 0x0F0F0F0F0F0F0F0F
-    return (bytes_ * 0x0101010101010101 >> 56 & 0xFF).sum(-1)
+    """How many pixels of each canvas are ON. (NumPy counts bits in hardware, PyTorch has no such operation.)"""
+    ones = np.bitwise_count(words.numpy(force=True)).sum(-1, dtype=np.int64)
+    return torch.as_tensor(ones, device=words.device)

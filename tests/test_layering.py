@@ -20,7 +20,13 @@ MAY_IMPORT = {  # part of lib -> the parts it may import beside itself
     "furniture": ["extractor", *LANGUAGES],
     "datasets": ["extractor", "furniture", *LANGUAGES],
 }
-LANGUAGE_LIBRARIES = {"torch", "numpy", "jaxtyping", "trimesh", "manifold3d"} | {  # and of the standard library:
+LANGUAGE_LIBRARIES = {
+    "torch",
+    "numpy",
+    "jaxtyping",
+    "trimesh",
+    "manifold3d",
+} | {  # and of the standard library:
     *(
         "__future__",
         "abc",

@@ -9,10 +9,13 @@ from .executing import execute, execute_many
 from .parsing import parse
 from .primitives import KINDS, Primitive
 from .program import OPERATIONS, Operation, Program, Tree
+from .sampling import LENGTHS, Rules, sample, sample_many
 from .shape import Picture, Shape, Shapes, Solid
+from .tracing import Step, trace
 from .vocabulary import Vocabulary, vocabulary_of
 
 __all__ = [
-    "KINDS", "OPERATIONS", "Operation", "Picture", "Primitive", "Program", "ProgramError", "Shape", "Shapes", "Solid",
-    "Tree", "Vocabulary", "execute", "execute_many", "parse", "vocabulary_of",
+    "KINDS", "LENGTHS", "OPERATIONS", "Operation", "Picture", "Primitive", "Program", "ProgramError", "Rules", "Shape",
+    "Shapes", "Solid", "Step", "Tree", "Vocabulary", "execute", "execute_many", "parse", "sample", "sample_many", "trace",
+    "vocabulary_of",
 ]  # fmt: skip

@@ -109,7 +109,7 @@ def run(
 ) -> tuple[Int[Tensor, "programs words"], Bool[Tensor, " programs"]]:
     """Each program's picture, and which programs are valid; the others' pictures are blank.
 
-    Tokens count the canvases from 0; after them come + * - and the stop, which ends a program. The length is at least 1.
+    Tokens count the canvases from 0; after them come + * - and the stop, which ends a program.
     """
     (programs, length), (primitives, words) = tokens.shape, canvases.shape
     device = canvases.device

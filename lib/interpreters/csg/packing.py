@@ -35,5 +35,6 @@ def unpack(words: Int[Tensor, "*lines"]) -> Bool[Tensor, "*lines 64"]:
 
 def count(words: Int[Tensor, "*batch lines"]) -> Int[Tensor, "*batch"]:
     """How many pixels of each canvas are ON. (NumPy counts bits in hardware, PyTorch has no such operation.)"""
-    ones = np.bitwise_count(words.numpy(force=True)).sum(-1, dtype=np.int64)
+    # Unsigned: of a negative number, whose pixel 63 is ON, NumPy counts the bits of the absolute value.
+    ones = np.bitwise_count(words.numpy(force=True).view(np.uint64)).sum(-1, dtype=np.int64)
     return torch.as_tensor(ones, device=words.device)

@@ -11,13 +11,14 @@ import re
 from ..quoting import quoted
 from .errors import ProgramError
 from .primitives import KINDS, Primitive
-from .program import OPERATIONS, STOP, Operation, Program, Statement, check
+from .program import LONGEST, OPERATIONS, STOP, Operation, Program, Statement, check
 
 _TOKEN = re.compile(r"([A-Za-z_]\w*)\s*\(([^()]*)\)")
-_WHOLE = re.compile(r"[+-]?[0-9]{1,9}")
+_WHOLE = re.compile(r"[+-]?[0-9]+")
 _JUNK = re.compile(r"\w+\s*\(?[^()+*$\s]*\)?|\S")  # what a reader would point at
 _SHORT = {letters[1:]: letters for letters in ("sp", "cu", "cy")}
 _FORMS = ", ".join(map(str, KINDS.values())) + f", or one of {' '.join((*OPERATIONS, STOP))}"
+_LONGEST_NUMBER = 9  # characters
 _LARGEST_TEXT = 1_000_000  # characters; a program of 1,023 tokens has less than 25,000
 
 
@@ -30,7 +31,7 @@ def parse(text: str) -> Program:
     statements: list[Statement] = []
     columns: list[int] = []
     place = _skip_blanks(text, 0)
-    while place < len(text) and text[place] != STOP:
+    while place < len(text) and text[place] != STOP and len(statements) <= LONGEST:
         columns.append(place + 1)
         statement, place = _statement(text, place, len(statements))
         statements.append(statement)
@@ -52,7 +53,7 @@ def _statement(text: str, place: int, index: int) -> tuple[Statement, int]:
     match = _TOKEN.match(text, place)
     if match is None:
         junk = _JUNK.match(text, place).group()
-        what = "is not closed" if "(" in junk else "is no token"
+        what = "is not closed" if "(" in junk[1:] and junk[-1] != ")" else "is no token"
         raise ProgramError(f"{quoted(junk)} {what}", index, junk, _FORMS, place + 1)
     letters = _SHORT.get(match[1], match[1])
     if letters not in KINDS:
@@ -60,8 +61,9 @@ def _statement(text: str, place: int, index: int) -> tuple[Statement, int]:
         raise ProgramError(found, index, match[0], _FORMS, place + 1)
     words = [word.strip() for word in match[2].split(",")] if match[2].strip() else []
     for word in words:
-        if not _WHOLE.fullmatch(word):
-            found = f"{quoted(word)} is not a whole number, in {quoted(match[0])}"
+        if not _WHOLE.fullmatch(word) or len(word) > _LONGEST_NUMBER:
+            what = "too long a number" if _WHOLE.fullmatch(word) else "not a whole number"
+            found = f"{quoted(word)} is {what}, in {quoted(match[0])}"
             raise ProgramError(found, index, match[0], str(KINDS[letters]), place + 1)
     try:
         return Primitive(letters, tuple(map(int, words))), match.end()

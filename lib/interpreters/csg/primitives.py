@@ -160,7 +160,7 @@ class Primitive:
             raise ProgramError(f"{quoted(text)} is no primitive", None, text, " ".join(KINDS))
         kind = KINDS[self.kind]
         if len(self.numbers) != len(kind.fields):
-            found = f"{quoted(text)} has {len(self.numbers)} numbers"
+            found = f"{quoted(text)} has {len(self.numbers)} number{'s' * (len(self.numbers) != 1)}"
             raise ProgramError(found, None, text, f"{len(kind.fields)}: {kind}")
         whole = tuple(_whole(field, number, text) for field, number in zip(kind.fields, self.numbers))
         object.__setattr__(self, "numbers", whole)  # numpy's whole numbers become Python's

@@ -69,7 +69,7 @@ def check(statements: Sequence[Statement], columns: Sequence[int] | None = None)
         raise error(0, "", "the program is empty", "a primitive, such as c(32,32,16)")
     if len(statements) > LONGEST:
         token = str(statements[LONGEST])
-        raise error(LONGEST, token, f"the program has {len(statements)} tokens", f"at most {LONGEST}")
+        raise error(LONGEST, token, "the program goes on", f"at most {LONGEST} tokens")
     stack = 0  # how many shapes wait
     dimensions = next((s.dimensions for s in statements if isinstance(s, Primitive)), None)
     for index, statement in enumerate(statements):
@@ -79,6 +79,9 @@ def check(statements: Sequence[Statement], columns: Sequence[int] | None = None)
                 found = f"'{token}' finds {stack} {'shape' if stack == 1 else 'shapes'} on the stack"
                 raise error(index, token, found, "two shapes before each operation")
             stack -= 1
+        elif not isinstance(statement, Primitive):
+            found = f"{quoted(token)} is a {type(statement).__name__}"
+            raise error(index, token, found, "a Primitive or an Operation")
         elif statement.dimensions != dimensions:
             found = (
                 f"{quoted(token)} is {_world(statement.dimensions)}, the program began {_world(dimensions)}"
@@ -107,6 +110,9 @@ class Program:
     statements: tuple[Statement, ...]
 
     def __post_init__(self):
+        object.__setattr__(
+            self, "statements", tuple(self.statements)
+        )  # a list could be changed, and has no hash
         check(self.statements)
 
     def __len__(self) -> int:
@@ -200,6 +206,10 @@ class Program:
                 waiting += [node.left, node.right]
                 node = node.operation
             backwards.append(node)
+            if len(backwards) > LONGEST:
+                raise ProgramError(
+                    "the tree goes on", expected=f"at most {LONGEST} primitives and operations"
+                )
         return Program(tuple(reversed(backwards)))
 
     def infix(self) -> str:

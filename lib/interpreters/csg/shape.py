@@ -1,14 +1,18 @@
 """What an executed program is: pixels or voxels, and the questions one asks of a shape.
 
 In the plane x grows right and y DOWN, image[y, x]; in space grid[x, y, z], z up. Pixel k has its center at k.
+Beside its pixels a shape has an exact form (see geometry), whose points and surfaces are not cut off by the canvas.
 """
 
 from collections.abc import Sequence
 from functools import cached_property
 
-from jaxtyping import Bool, Int
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from . import geometry
 from .errors import ProgramError
 from .packing import SIDE, count, unpack
 from .program import Program
@@ -32,6 +36,29 @@ class Shape:
         """How many pixels or voxels are ON."""
         return int(count(self.words))
 
+    def occupancy(self, points) -> Bool[Tensor, " n"]:
+        """Is each point inside the exact shape? (n, 2) x, y or (n, 3) x, y, z. Raises ValueError for another shape.
+
+        At the centers of pixels, whole numbers from 0 to 63, this is the picture or the grid itself.
+        """
+        return geometry.occupancy(self.program, points)
+
+    def voxels(self, resolution: int) -> Bool[Tensor, "r *rs"]:
+        """The exact shape at the centers of `resolution` cells along each side of the canvas.
+
+        (r, r), [row y, column x], or (r, r, r), [x, y, z]; 64 makes the picture or the grid. Raises ValueError.
+        """
+        return geometry.voxels(self.program, resolution, self.words.device)
+
+    def to_stl(self) -> bytes:
+        """A binary STL file of the mesh, z up. Slicers take the unit for a millimetre: the canvas is 64 mm wide.
+
+        Raises ProgramError for a shape without an inside.
+        """
+        from .solids import stl
+
+        return stl(_with_inside(self.mesh()))
+
 
 class Picture(Shape):
     """A shape in the plane."""
@@ -41,6 +68,50 @@ class Picture(Shape):
         """The pixels, [row y, column x]."""
         return unpack(self.words)
 
+    @cached_property
+    def area(self) -> float:
+        """The exact area in square pixels, with true circles, of the whole shape, what is off the canvas included."""
+        from .outlines import area
+
+        return area(self.program)
+
+    def outline(self, segments: int = 64) -> list[Float[np.ndarray, "_ 2"]]:
+        """The closed rings of the outline, (corners, 2) x, y each; empty for a shape without an inside.
+
+        Outer rings run clockwise as one sees them, holes the other way; segments: corners of a whole circle.
+        """
+        from .outlines import rings
+
+        return rings(self.program, segments)
+
+    def surface_points(self, n: int, seed: int = 0) -> Float[Tensor, "n 2"]:
+        """n points on the outline, uniform by length. Raises ProgramError for a shape without an inside."""
+        from .outlines import points_on
+
+        return _drawn(points_on, self.outline(), n, seed)
+
+    def mesh(self, height: float = 8.0, segments: int = 64):
+        """A trimesh.Trimesh: the picture cut out of a plate, watertight; without faces if there is nothing inside.
+
+        x, 63 - y and z from 0 to `height` pixels: from above, where z points, it looks like the picture.
+        """
+        from .outlines import plate
+        from .solids import triangles
+
+        return triangles(plate(self.program, height, segments))
+
+    def to_svg(self, color: str = "#5e8bba") -> str:
+        """The outline as an SVG file that shows the canvas. Raises ProgramError for a shape without an inside."""
+        from .outlines import to_svg
+
+        return to_svg(_with_inside(self.outline()), color)
+
+    def to_glb(self) -> bytes:
+        """The plate as a GLB file, standing upright. Raises ProgramError for a shape without an inside."""
+        from .solids import glb
+
+        return glb(_with_inside(self.mesh()), turn=False)
+
 
 class Solid(Shape):
     """A shape in space."""
@@ -49,6 +120,40 @@ class Solid(Shape):
     def grid(self) -> Bool[Tensor, "64 64 64"]:
         """The voxels, [x, y, z]."""
         return unpack(self.words).view(SIDE, SIDE, SIDE)
+
+    def mesh(self, segments: int = 64):
+        """A trimesh.Trimesh, watertight, in the grid's coordinates; without faces for a shape without an inside.
+
+        segments: corners of a whole circle, a multiple of 4.
+        """
+        from .solids import solid, triangles
+
+        return triangles(solid(self.program, segments))
+
+    def surface_points(self, n: int, seed: int = 0) -> Float[Tensor, "n 3"]:
+        """n points on the mesh, uniform by area. Raises ProgramError for a shape without an inside."""
+        from .solids import points_on
+
+        return _drawn(points_on, self.mesh(), n, seed)
+
+    def to_glb(self) -> bytes:
+        """The mesh as a GLB file, where y is up: x, z, -y. Raises ProgramError for a shape without an inside."""
+        from .solids import glb
+
+        return glb(_with_inside(self.mesh()), turn=True)
+
+
+def _with_inside(made):
+    """The rings or mesh. Raises ProgramError where there are none."""
+    if not len(getattr(made, "faces", made)):
+        raise ProgramError("the shape has no inside", expected="a program that leaves something over")
+    return made
+
+
+def _drawn(points_on, surface, n: int, seed: int) -> Float[Tensor, "n d"]:
+    if n < 0:
+        raise ValueError(f"found {n} points; expected a whole number, at least 0")
+    return torch.from_numpy(points_on(_with_inside(surface), n, seed)).float()
 
 
 class Shapes(Sequence):

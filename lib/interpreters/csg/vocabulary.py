@@ -11,6 +11,7 @@ The rule of the plane gives the authors' own list. Their list of space is not pu
 number 6,631. Primitives are sorted as the authors sort theirs: as strings, those of space without their first letter.
 """
 
+import operator
 from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import product
@@ -23,7 +24,7 @@ from ..quoting import quoted
 from .errors import ProgramError
 from .packing import SIDE
 from .primitives import KINDS, Primitive, draw, triangle_corners
-from .program import OPERATIONS, STOP, Operation, Program, check
+from .program import OPERATIONS, STOP, Operation, Program
 
 CENTERS, SIZES = range(8, 57, 8), range(8, 33, 4)
 
@@ -32,8 +33,12 @@ class Vocabulary:
     """Distinct primitives of one dimension, numbered from 0, and after them `+ * - $`."""
 
     def __init__(self, primitives: Iterable[Primitive], dimensions: int = 2):
-        """dimensions: 2 or 3, of a vocabulary without primitives; else theirs."""
+        """dimensions: 2 or 3, of a vocabulary without primitives; else theirs.
+
+        Raises ProgramError for primitives of both dimensions, and for one that comes twice.
+        """
         self.primitives = tuple(primitives)
+        _check_distinct(self.primitives)
         self.texts = (*map(str, self.primitives), *OPERATIONS, STOP)
         self.dimensions = max((p.dimensions for p in self.primitives), default=dimensions)
         self._indices = {text: index for index, text in enumerate(self.texts)}
@@ -67,18 +72,32 @@ class Vocabulary:
 
     def program(self, tokens: Sequence[int] | Int[Tensor, " tokens"]) -> Program:
         """The program that indices spell, up to the first `$`. Raises ProgramError for what is no program."""
-        indices = tokens.tolist() if isinstance(tokens, Tensor) else list(tokens)
-        if self.stop in indices:
-            indices = indices[: indices.index(self.stop)]
         statements = []
-        for place, index in enumerate(indices):
-            if not 0 <= index < self.stop:
+        for place, token in enumerate(tokens.tolist() if isinstance(tokens, Tensor) else tokens):
+            index = operator.index(token) if hasattr(token, "__index__") else -1
+            if not 0 <= index <= self.stop:
                 expected = f"0 to {self.stop}, where {self.stop} is {STOP}"
-                raise ProgramError(f"{index} is not a token", place, str(index), expected)
-            operation = index >= len(self.primitives)
-            statements.append(Operation(self.texts[index]) if operation else self.primitives[index])
-        check(statements)
+                raise ProgramError(f"{quoted(str(token))} is not a token", place, str(token), expected)
+            if index == self.stop:
+                break
+            is_primitive = index < len(self.primitives)
+            statements.append(self.primitives[index] if is_primitive else Operation(self.texts[index]))
         return Program(tuple(statements))
+
+
+def _check_distinct(primitives: Sequence[Primitive]) -> None:
+    """Raises ProgramError unless these are distinct primitives of one dimension."""
+    before: set[Primitive] = set()
+    for place, primitive in enumerate(primitives):
+        if not isinstance(primitive, Primitive):
+            raise ProgramError(f"item {place} is a {type(primitive).__name__}", expected="a Primitive")
+        text = str(primitive)
+        if primitive in before:
+            raise ProgramError(f"{quoted(text)} is there twice", token=text, expected="distinct primitives")
+        if primitive.dimensions != primitives[0].dimensions:
+            found = f"{quoted(str(primitives[0]))} and {quoted(text)} are not of one dimension"
+            raise ProgramError(found, token=text, expected="all in the plane or all in space")
+        before.add(primitive)
 
 
 @cache

@@ -11,26 +11,21 @@ The files are the same, byte by byte, whatever the number of workers and however
 """
 
 import argparse
-import hashlib
 import json
-import os
 import sys
 import time
-import warnings
 import zipfile
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
 from data_scripts.extraction_worker import UNREADABLE, extract_chunk
-from data_scripts.journal import Journal, write_whole
-from lib.datasets import CATEGORIES, REPOSITORY, DataError
+from data_scripts.journal import Journal, code_digest, write_whole
+from data_scripts.parallel import in_parallel
+from lib.datasets import CATEGORIES, DataError
 from lib.extractor import PartGraphError
 from lib.extractor.files import sources
 
@@ -95,41 +90,6 @@ def category_of(source: Path, name: str) -> str:
     )
 
 
-@contextmanager
-def workers(count: int, scheduler: str | None) -> Iterator[None]:
-    """Where chunks are worked on: `count` processes (-1: one for each core), or a running Dask cluster.
-
-    Raises DataError for a cluster that is not there, and for workers that end before their work does.
-    """
-    with parallel_config("loky", n_jobs=count) if scheduler is None else _cluster(scheduler):
-        try:
-            yield
-        except BrokenExecutor as error:
-            raise DataError(
-                "a worker was ended from outside, perhaps for want of memory; the same command goes on from here, "
-                "fewer --workers need less memory"
-            ) from error
-
-
-@contextmanager
-def _cluster(scheduler: str) -> Iterator[None]:
-    try:
-        from distributed import Client, KilledWorker  # optional: pip install -e '.[cluster]'
-    except ImportError as error:
-        raise DataError(f"--scheduler needs Dask: pip install -e '.[cluster]' ({error})") from error
-    try:
-        client = Client(scheduler, timeout=10)
-    except (OSError, ValueError) as error:
-        raise DataError(f"no Dask scheduler answers at {scheduler} ({error})") from error
-    try:
-        with client, parallel_config("dask", n_jobs=-1):
-            yield
-    except KilledWorker as error:
-        raise DataError(
-            f"the cluster's workers ended ({error}); the same command goes on from here"
-        ) from error
-
-
 def extract_all(options: argparse.Namespace) -> tuple[list[dict], int]:
     """All rows, sorted by name, and how many of them were made now. Raises DataError and PartGraphError."""
     found = fingerprints(options.input, options.category)
@@ -168,22 +128,16 @@ def unfinished(found: dict[str, str], journal: Journal) -> list[dict[str, str]]:
 def extract_chunks(chunks: list[dict[str, str]], options: argparse.Namespace) -> Iterator[list[dict]]:
     """The rows of each chunk, whichever is ready first. Raises DataError when the workers cannot go on."""
     source = options.input.resolve()  # a worker may have another working folder
-    parent = None if options.scheduler else os.getpid()
-    with warnings.catch_warnings(), workers(options.workers, options.scheduler):
-        warnings.filterwarnings("ignore", ".* tasks which were still being processed")  # joblib, at Ctrl-C
-        jobs = (delayed(extract_chunk)(source, chunk, options.keep_rejected, parent) for chunk in chunks)
-        yield from Parallel(return_as="generator_unordered", batch_size=1)(jobs)
+    jobs = ((source, chunk, options.keep_rejected) for chunk in chunks)
+    yield from in_parallel(extract_chunk, jobs, options.workers, options.scheduler)
 
 
 def settings(options: argparse.Namespace) -> dict[str, str]:
     """What, beside the files, decides what comes out."""
-    code = hashlib.sha256()
-    for path in sorted(path for part in CODE for path in (REPOSITORY / "lib" / part).rglob("*.py")):
-        code.update(path.read_bytes())
     return {
         "category": options.category or "by folder",
         "keep_rejected": str(options.keep_rejected),
-        "code": code.hexdigest()[:12],
+        "code": code_digest(*CODE),
     }
 
 

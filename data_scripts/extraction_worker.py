@@ -1,15 +1,12 @@
 """A worker of extract_programs: reads a chunk of part graphs, extracts programs, tells what became of each file."""
 
 import math
-import os
-import threading
-import time
 import warnings
-from functools import cache
 from pathlib import Path
 
 import torch
 
+from data_scripts.parallel import end_with
 from lib.extractor import Extraction, Options, PartGraph, PartGraphError, extract_many
 from lib.extractor.errors import PartGraphWarning
 from lib.extractor.files import load
@@ -25,8 +22,7 @@ def extract_chunk(
 
     A process other than `parent` (its id), which started it, ends with that one.
     """
-    if parent is not None and os.getpid() != parent:
-        _end_with(parent)
+    end_with(parent)
     torch.set_num_threads(1)  # the processes share the cores; and sums come in the same order everywhere
     graphs, outcomes = {}, {}
     for name, fingerprint in chunk.items():
@@ -84,15 +80,3 @@ def _outcome(extraction: Extraction) -> dict:
 def _failure(reason: str, error: Exception) -> dict:
     what = str(error) if isinstance(error, PartGraphError) else f"{type(error).__name__}: {error}"
     return {"accepted": False, "reason": reason, "detail": what, "f_score": None, "program": None}
-
-
-@cache  # one watch a process
-def _end_with(parent: int) -> None:
-    """Ends this process soon after its parent: joblib's workers would wait for ever for one that was killed."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()

@@ -4,10 +4,11 @@ A journal is a file of JSON lines: the run's settings, then one row for each fin
 Rows are appended a batch at a time, in one write; a last line that a kill cut short is dropped when it is read again.
 """
 
+import hashlib
 import json
 from pathlib import Path
 
-from lib.datasets import DataError
+from lib.datasets import REPOSITORY, DataError
 
 
 class Journal:
@@ -63,6 +64,14 @@ def write_whole(path: Path, content: bytes) -> None:
     part = path.with_name("half.part")  # not a longer name: the file's own may be as long as names can be
     part.write_bytes(content)
     part.replace(path)
+
+
+def code_digest(*parts: str) -> str:
+    """Twelve hexadecimal digits that change when the code below lib/PART does, for any of the parts."""
+    code = hashlib.sha256()
+    for path in sorted(path for part in parts for path in (REPOSITORY / "lib" / part).rglob("*.py")):
+        code.update(path.read_bytes())
+    return code.hexdigest()[:12]
 
 
 def _text(rows: list[dict]) -> bytes:

@@ -16,6 +16,6 @@ from .vocabulary import Vocabulary, vocabulary_of
 
 __all__ = [
     "KINDS", "LENGTHS", "OPERATIONS", "Operation", "Picture", "Primitive", "Program", "ProgramError", "Rules", "Shape",
-    "Shapes", "Solid", "Step", "Tree", "Vocabulary", "execute", "execute_many", "parse", "sample", "sample_many", "trace",
-    "vocabulary_of",
+    "Shapes", "Solid", "Step", "Tree", "Vocabulary", "execute", "execute_many", "parse", "sample", "sample_many",
+    "trace", "vocabulary_of",
 ]  # fmt: skip

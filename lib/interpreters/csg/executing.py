@@ -29,7 +29,8 @@ def execute_many(
 
     programs    Programs of one dimension with any primitives; or what networks write: tokens, each row a program in the
                 given vocabulary that ends at the first `$`. Rows that are not valid make blank shapes.
-    vocabulary  what the tokens mean: that of the plane, or of `dimensions` (2 or 3), if left out.
+    vocabulary  what the tokens mean: that of the plane, or of `dimensions` (2 or 3), if left out. Programs may have
+                primitives of no vocabulary, so they do not need one.
     device      where to compute: that of the tokens, if left out.
     Raises ProgramError for Programs of both dimensions, and for numbers that are no tokens.
     """
@@ -39,12 +40,10 @@ def execute_many(
         vocabulary = vocabulary or vocabulary_of(dimensions or 2)
         tokens = _checked(programs, vocabulary)
     else:
-        tokens, vocabulary = _spell(list(programs), dimensions)
+        tokens, vocabulary = _spell(list(programs), vocabulary, dimensions)
     device = tokens.device if device is None else torch.device(device)
     tokens = tokens.to(device, torch.int64)
-    if not tokens.shape[1]:  # nothing but empty programs
-        tokens = tokens.new_full((len(tokens), 1), vocabulary.stop)
-    words, valid = run(tokens, vocabulary.canvases(device))
+    words, valid = run(_without_padding(tokens, vocabulary.stop), vocabulary.canvases(device))
     return Shapes(words, valid, tokens, vocabulary)
 
 
@@ -66,8 +65,18 @@ def _checked(tokens: Tensor, vocabulary: Vocabulary) -> Int[Tensor, "programs le
     raise ProgramError(f"{quoted(token)} is not a token, in program {row}", place, token, expected)
 
 
-def _spell(programs: list[Program], dimensions: int | None) -> tuple[Tensor, Vocabulary]:
-    """The programs' tokens, in a vocabulary of the primitives that they have."""
+def _without_padding(tokens: Tensor, stop: int) -> Int[Tensor, "programs shorter"]:
+    """The tokens without the columns at the end that are nothing but `$`; at least one column stays."""
+    used = (tokens != stop).any(0).nonzero()
+    if not len(used):  # nothing but empty programs
+        return tokens.new_full((len(tokens), 1), stop)
+    return tokens[:, : int(used[-1]) + 1]
+
+
+def _spell(
+    programs: list[Program], vocabulary: Vocabulary | None, dimensions: int | None
+) -> tuple[Tensor, Vocabulary]:
+    """The programs' tokens, in a vocabulary of the primitives that they have unless one is given."""
     for place, program in enumerate(programs):
         if not isinstance(program, Program):
             expected = "a Program, see parse(text), or all tokens in one torch tensor"
@@ -77,10 +86,11 @@ def _spell(programs: list[Program], dimensions: int | None) -> tuple[Tensor, Voc
         primitives |= dict.fromkeys(program.primitives)
     worlds = {primitive.dimensions for primitive in primitives} | ({dimensions} if dimensions else set())
     if len(worlds) > 1:
-        mixed = next(p for p in programs if p.dimensions != (dimensions or programs[0].dimensions))
-        found = f"programs of the plane and of space together, such as {quoted(mixed.to_text())}"
-        raise ProgramError(found, token=mixed.to_text(), expected="one dimension in a batch")
-    vocabulary = Vocabulary(primitives, *worlds)
+        wanted = dimensions or programs[0].dimensions
+        other = next(program for program in programs if program.dimensions != wanted)
+        found = f"{quoted(other.to_text())} has {other.dimensions} dimensions"
+        raise ProgramError(found, token=other.to_text(), expected=f"programs with {wanted} only")
+    vocabulary = vocabulary or Vocabulary(primitives, *worlds)
     length = max(map(len, programs), default=0)
     rows = [program.tokens(vocabulary, length) for program in programs]
     return torch.stack(rows) if rows else torch.zeros((0, 0), dtype=torch.int64), vocabulary

@@ -115,7 +115,9 @@ def run(
     device = canvases.device
     pictures = canvases.new_empty((programs, words))
     valid = torch.empty(programs, dtype=torch.bool, device=device)
-    step = max(1, min(programs, _WORKSPACE[device.type] // (words * max(1, length // 2))))
+    step = max(
+        1, min(programs, _WORKSPACE.get(device.type, _WORKSPACE["cuda"]) // (words * max(1, length // 2)))
+    )
     workspace = canvases.new_empty((1 + min(primitives, step * length) + step * (length // 2), words))
     workspace[0] = 0
     for begin in range(0, programs, step):

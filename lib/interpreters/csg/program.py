@@ -61,15 +61,17 @@ def check(statements: Sequence[Statement], columns: Sequence[int] | None = None)
 
     columns: the 1-based place in the text of each statement and, last, of the text's end.
     """
+    if problem := _problem(statements):
+        index, token, found, expected = problem
+        raise ProgramError(found, index, token, expected, columns[index] if columns else None)
 
-    def error(index: int, token: str, found: str, expected: str) -> ProgramError:
-        return ProgramError(found, index, token, expected, columns[index] if columns else None)
 
+def _problem(statements: Sequence[Statement]) -> tuple[int, str, str, str] | None:
+    """The first token that cannot stand where it does: index, token, what is wrong, what was expected."""
     if not statements:
-        raise error(0, "", "the program is empty", "a primitive, such as c(32,32,16)")
+        return 0, "", "the program is empty", "a primitive, such as c(32,32,16)"
     if len(statements) > LONGEST:
-        token = str(statements[LONGEST])
-        raise error(LONGEST, token, "the program goes on", f"at most {LONGEST} tokens")
+        return LONGEST, str(statements[LONGEST]), "the program goes on", f"at most {LONGEST} tokens"
     stack = 0  # how many shapes wait
     dimensions = next((s.dimensions for s in statements if isinstance(s, Primitive)), None)
     for index, statement in enumerate(statements):
@@ -77,23 +79,24 @@ def check(statements: Sequence[Statement], columns: Sequence[int] | None = None)
         if isinstance(statement, Operation):
             if stack < 2:
                 found = f"'{token}' finds {stack} {'shape' if stack == 1 else 'shapes'} on the stack"
-                raise error(index, token, found, "two shapes before each operation")
+                return index, token, found, "two shapes before each operation"
             stack -= 1
         elif not isinstance(statement, Primitive):
             found = f"{quoted(token)} is a {type(statement).__name__}"
-            raise error(index, token, found, "a Primitive or an Operation")
+            return index, token, found, "a Primitive or an Operation"
         elif statement.dimensions != dimensions:
             found = (
                 f"{quoted(token)} is {_world(statement.dimensions)}, the program began {_world(dimensions)}"
             )
             expected = " or ".join(str(k) for k in KINDS.values() if k.dimensions == dimensions)
-            raise error(index, token, found, expected)
+            return index, token, found, expected
         else:
             stack += 1
     if stack > 1:
         found = f"the program ends with {stack} shapes on the stack"
         missing = f"{stack - 1} more operation{'s' if stack > 2 else ''}, to leave one shape"
-        raise error(len(statements), "", found, missing)
+        return len(statements), "", found, missing
+    return None
 
 
 def _world(dimensions: int) -> str:

@@ -4,6 +4,7 @@ In the plane x grows right and y DOWN, image[y, x]; in space grid[x, y, z], z up
 Beside its pixels a shape has an exact form (see geometry), whose points and surfaces are not cut off by the canvas.
 """
 
+import operator
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -172,9 +173,12 @@ class Shapes(Sequence):
         return len(self.words)
 
     def __getitem__(self, index):
-        """Raises ProgramError for a program that is not valid, saying why."""
+        """A number gives a Shape, or raises ProgramError saying why not; a slice or a mask (tensor) gives Shapes."""
         if isinstance(index, slice):
+            index = torch.tensor(range(len(self))[index], dtype=torch.int64, device=self.words.device)
+        if isinstance(index, Tensor) and index.ndim == 1:
             return Shapes(self.words[index], self.valid[index], self.tokens[index], self.vocabulary)
+        index = operator.index(index)
         if not -len(self) <= index < len(self):
             raise IndexError(f"shape {index} of {len(self)}")
         program = self.vocabulary.program(self.tokens[index])

@@ -24,12 +24,32 @@ from lib.extractor import PartGraphError
 from lib.extractor.files import load as load_graph
 from lib.extractor.files import sources
 from lib.furniture import make
+from lib.furniture.silhouettes import SPLITS as IMAGE_SPLITS
+from lib.furniture.silhouettes import ImageError, ImageSet, joined, made
+from lib.furniture.silhouettes import read as read_images
 from lib.interpreters.shapeassembly import Program, ProgramError, parse
 
 CATEGORIES = ("chair", "table", "storage")
 SPLITS = ("train", "val")
 EMBEDDED_SIZES = {"train": 40, "val": 8}  # programs a category
+IMAGE_SOURCES = ("shapeassembly", "furniture", "sweethome3d")  # what data_scripts.make_silhouettes knows
+EMBEDDED_IMAGES = 50  # shapes a category, of which there are masks with no download: a second's work
 FURNITURE = 1000  # part graphs a category; the maker has no end of them
+CSG_SPLITS = ("train", "val", "test")
+CSG_SIZES = {  # programs by dimension, tokens and split: CSGNet's Table 1
+    dimensions: {length: dict(zip(CSG_SPLITS, (1000 * n for n in row))) for length, row in table.items()}
+    for dimensions, table in {
+        2: {
+            3: (25, 5, 5),
+            5: (100, 10, 50),
+            7: (150, 20, 50),
+            9: (250, 20, 50),
+            11: (350, 20, 100),
+            13: (350, 20, 100),
+        },
+        3: {3: (100, 10, 20), 5: (200, 20, 40), 7: (400, 40, 80)},
+    }.items()
+}
 PARTNET = {
     "chair": "chair_hier",
     "table": "table_hier",
@@ -142,6 +162,33 @@ def part_graphs(category: str) -> GraphSet:
     return GraphSet(names, lambda name: load_graph(folder, name, category), "real", category)
 
 
+def silhouettes(source: str | None = None, split: str | None = None) -> ImageSet:
+    """64x64 masks of furniture from the front and the side, without programs; `.source` says whose furniture it is.
+
+    source  "shapeassembly", "furniture" or "sweethome3d", as made by data_scripts.make_silhouettes; "embedded" for
+            a few that are made on the spot; None for all that were made, and where there are none, the embedded ones.
+    split   "train", "val", "test", or None for all: no shape and no mask is in two of them.
+    Raises DataError for another source or split, one that was not made, and files that are damaged.
+    """
+    sources = _choose("source", source, (*IMAGE_SOURCES, "embedded"))
+    _choose("split", split, IMAGE_SPLITS)
+    folder = data_root() / "silhouettes"
+    if source is None:
+        sources = [name for name in IMAGE_SOURCES if (folder / f"{name}.npz").exists()] or ["embedded"]
+    images = joined([_images(folder, name) for name in sources])
+    return images if split is None else images.select(split)
+
+
+def logos(split: str | None = None) -> ImageSet:
+    """64x64 masks of logos, for testing alone as in CSGNet's paper, so that all of them are in the split "test".
+
+    Raises DataError for another split, and where they were not made with data_scripts.make_logos.
+    """
+    _choose("split", split, IMAGE_SPLITS)
+    images = _images(data_root() / "silhouettes", "logos")
+    return images if split is None else images.select(split)
+
+
 def examples() -> dict[str, Program]:
     """The hand-written example programs by name, in alphabetical order."""
     return {path.stem: _read(path) for path in _example_files()}
@@ -163,6 +210,20 @@ def _choose(what: str, value: str | None, choices: tuple[str, ...]) -> tuple[str
     if value not in choices:
         raise DataError(f"unknown {what} {value!r}: choose one of {', '.join(choices)}, or None for all")
     return (value,)
+
+
+def _images(folder: Path, source: str) -> ImageSet:
+    """One source's masks. Raises DataError, with the command that makes them."""
+    if source == "embedded":
+        return made(EMBEDDED_IMAGES)
+    script = "make_logos" if source == "logos" else f"make_silhouettes --source {source}"
+    path = folder / f"{source}.npz"
+    if not path.exists():
+        raise DataError(f"there is no {path}; make it: python -m data_scripts.{script}")
+    try:
+        return read_images(path, source)
+    except ImageError as error:
+        raise DataError(f"{error}; make it again: python -m data_scripts.{script}") from error
 
 
 def _example_files() -> list[Path]:

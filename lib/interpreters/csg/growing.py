@@ -208,12 +208,14 @@ def _boxes(pairs: _Pairs) -> Int[Tensor, "n 2 dimensions"]:
 def _canvases(pairs: _Pairs) -> Int[Tensor, "n words"]:
     """The results' canvases."""
     table, right = pairs.left.words, pairs.right
-    many = pairs.operation.bincount(minlength=3).tolist()
-    for kind, group in enumerate(torch.arange(len(table)).split(many)):  # pairs are sorted by operation
-        for some in group.split(max(1, _WORKSPACE // table.shape[1])):
-            a, b = table[some[0] : some[-1] + 1], right[some].words
+    step, start = max(1, _WORKSPACE // table.shape[1]), 0
+    for kind, many in enumerate(pairs.operation.bincount(minlength=3).tolist()):  # pairs are sorted by operation
+        for first in range(start, start + many, step):
+            rows = slice(first, min(first + step, start + many))
+            a, b = table[rows], right[rows].words
             if kind == UNION:
                 a |= b
             else:
                 a &= b if kind == INTERSECT else b.bitwise_not_()
+        start += many
     return table

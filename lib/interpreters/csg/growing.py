@@ -23,10 +23,10 @@ from .vocabulary import Vocabulary
 # Rule d, by dimension: how often a part is paired for an intersection or a subtraction before it is united, and which
 # share of these tries are intersections. Chosen such that inside programs all three operations are found equally often;
 # a last pair is tried more often, because it is cheap (nobody needs its canvas) and its surplus of unions is dropped.
-_TRIES, _INTERSECTING = {2: 8, 3: 28}, {2: 0.54, 3: 0.465}
-_LAST_TRIES, _LAST_INTERSECTING = {2: 40, 3: 100}, {2: 0.8, 3: 0.68}
+_TRIES, _INTERSECTING = {2: 8, 3: 34}, {2: 0.54, 3: 0.345}
+_LAST_TRIES, _LAST_INTERSECTING = {2: 40, 3: 100}, {2: 0.8, 3: 0.33}
 # How often each kind is drawn, chosen such that all are found equally often in programs that follow the rules.
-_KINDS = {"c": 0.322, "s": 0.318, "t": 0.36, "cu": 0.376, "cy": 0.3, "sp": 0.324}
+_KINDS = {"c": 0.322, "s": 0.318, "t": 0.36, "cu": 0.335, "cy": 0.34, "sp": 0.325}
 _UNITING = 4  # how often a part is paired for a union, in the end
 _MARGIN = 1.15  # how many more parts are grown than are needed, for those that find no partner
 _WORKSPACE = 1 << 17  # words compared in one go: what a core's cache holds
@@ -77,7 +77,7 @@ def grow(
         for left, many in enumerate(splits[size]):
             for part in (2 * left + 1, size - 2 - 2 * left):
                 need[part] = need.get(part, 0) + int(many * (_MARGIN if part > 1 else 1)) + 1
-    least, union = max(1, rules.side**vocabulary.dimensions), len(vocabulary.primitives)
+    least, union = rules.least_on(vocabulary.dimensions), len(vocabulary.primitives)
     parts = {1: _draw(rng, need[1], vocabulary)}
     for size in range(3, length, 2):
         parts[size] = _joined(rng, _pairs(rng, parts, splits[size], vocabulary.dimensions, rules), union)
@@ -209,7 +209,9 @@ def _canvases(pairs: _Pairs) -> Int[Tensor, "n words"]:
     """The results' canvases."""
     table, right = pairs.left.words, pairs.right
     step, start = max(1, _WORKSPACE // table.shape[1]), 0
-    for kind, many in enumerate(pairs.operation.bincount(minlength=3).tolist()):  # pairs are sorted by operation
+    for kind, many in enumerate(
+        pairs.operation.bincount(minlength=3).tolist()
+    ):  # pairs are sorted by operation
         for first in range(start, start + many, step):
             rows = slice(first, min(first + step, start + many))
             a, b = table[rows], right[rows].words

@@ -7,8 +7,8 @@ choice, this is ours:
        frequent [section 4.1: types are uniform]. Every tree of a length is as likely as every other.
     b  [each operation changes the number of ON pixels by at least 10 % of the sum of pixels in two shapes] The result
        differs from both operands, A and B, in at least a tenth of |A| + |B| pixels.
-    c  [the number of ON pixels in the final image is above a threshold] There are at least 12^2 pixels or 12^3 voxels.
-       The smallest square has 12 x 12 pixels; the paper does not tell its threshold. Operands need not reach it.
+    c  [the number of ON pixels in the final image is above a threshold] There are as many as the smallest square or cube
+       of the vocabulary has: 12^2 pixels or 7^3 voxels. The paper tells no number. Operands need not reach it.
     d  [boost subtract and intersect] Most pairs of shapes can only be united. So they are tried first for intersections
        and subtractions, with several partners, and united only when all fail; and of the programs that end with a
        union, an intersection, a subtraction as many are kept.
@@ -29,9 +29,10 @@ from .program import LONGEST, Program
 from .vocabulary import vocabulary_of
 
 LENGTHS = {2: (3, 5, 7, 9, 11, 13), 3: (3, 5, 7)}  # tokens, by dimension; the paper's Table 1
+SMALLEST = {2: 12, 3: 7}  # pixels along a side of the vocabulary's smallest square and cube, by dimension
 UNION, INTERSECT, SUBTRACT = range(3)  # operations as they follow the primitives in a vocabulary
 _FEWEST = 32  # programs grown together: among fewer, partners are rare
-_MOST = {2: 4096, 3: 1024}  # programs grown together, by dimension: what fits the memory of a small laptop
+_MOST = {2: 4096, 3: 2048}  # programs grown together, by dimension: what fits the memory of a small laptop
 _BARREN = 20  # batches without a new program before we give up
 
 
@@ -40,13 +41,18 @@ class Rules:
     """What a random program must be like; switch a rule off to see what it is there for.
 
     change    rule b: the least share of |A| + |B| in which an operation's result differs from A and from B
-    side      rule c: the final shape has at least as many pixels as a square, or cube, of this side
+    side      rule c: the final shape has at least as many pixels as a square or cube of this side; None: SMALLEST
     balanced  rule d: all three operations as often; else they are tried equally often, whatever comes of it
     """
 
     change: float = 0.1
-    side: int = 12
+    side: int | None = None
     balanced: bool = True
+
+    def least_on(self, dimensions: int) -> int:
+        """Rule c: how many pixels or voxels are enough."""
+        side = SMALLEST[dimensions] if self.side is None else self.side
+        return max(1, side**dimensions)
 
     def meets_change(
         self,

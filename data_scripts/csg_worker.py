@@ -9,9 +9,7 @@ from lib.interpreters.csg import sample_many
 Chunk = tuple[int, int, int]  # dimensions, tokens of a program, number of the chunk
 
 
-def make_chunk(
-    seed: int, chunk: Chunk, programs: int, parent: int | None = None
-) -> tuple[Chunk, np.ndarray]:
+def make_chunk(seed: int, chunk: Chunk, programs: int, parent: int | None = None) -> tuple[Chunk, np.ndarray]:
     """The chunk and its tokens (programs, length) uint16, which depend on nothing but the arguments."""
     end_with(parent)
     torch.set_num_threads(1)  # the processes share the cores

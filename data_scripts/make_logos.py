@@ -32,7 +32,7 @@ from data_scripts import mask_files
 from data_scripts.mask_files import Drawn
 from data_scripts.packages import Package, obtain
 from lib.datasets import DataError, data_root
-from lib.furniture.silhouettes import read
+from lib.datasets.images import read
 from lib.interpreters.rasterising import FILL, SAMPLES, SIZE, pixels
 
 PACKAGE = Package(

@@ -9,7 +9,7 @@
 
 They go to data/silhouettes (or --out): SOURCE.npz, which lib.datasets.silhouettes reads, SOURCE.json with counts, what
 was left out and why, licences and credits, and with --sheet contact sheets to look at. How a mask is drawn is told in
-lib/interpreters/rasterising.py, how splits are made in lib/furniture/silhouettes.py; the ShapeAssembly data set's own
+lib/interpreters/rasterising.py, how splits are made in lib/datasets/images.py; the ShapeAssembly data set's own
 validation shapes are our test split.
 
 The files are the same, byte by byte, whatever the number of workers. What is there and right is not made again; a
@@ -41,7 +41,7 @@ from lib.datasets import (
     data_root,
     shapeassembly,
 )
-from lib.furniture.silhouettes import SHARES, read, split_of, views_of
+from lib.datasets.images import SHARES, read, split_of, views_of
 from lib.interpreters.rasterising import VIEWS, box_triangles, silhouettes
 from lib.interpreters.shapeassembly import ProgramError, execute_many
 
@@ -51,6 +51,7 @@ CODE = (  # what, changed, draws other masks
     "lib/interpreters/cuboids.py",
     "lib/interpreters/rasterising.py",
     "lib/interpreters/shapeassembly/*.py",
+    "lib/datasets/images.py",
     "lib/furniture/*.py",
     "data_scripts/sweethome.py",
 )

@@ -20,7 +20,7 @@ import numpy as np
 
 from data_scripts.journal import write_whole
 from lib.datasets import REPOSITORY
-from lib.furniture.silhouettes import BLANK, COLUMNS, FULL, SHARES, SPLITS, ImageSet, fault, in_one_split
+from lib.datasets.images import BLANK, COLUMNS, FULL, SHARES, SPLITS, ImageSet, fault, in_one_split
 from lib.interpreters.rasterising import FILL, SAMPLES, SIZE
 
 SHEET = (8, 12)  # masks down and across

@@ -49,7 +49,9 @@ def real_data(tmp_path, monkeypatch):
 @pytest.mark.parametrize("split", ["train", "val", None])
 def test_embedded_sets_have_their_sizes(no_real_data, category, split):
     programs = shapeassembly(category, split)
-    per_category = sum(size for name, size in datasets.EMBEDDED_SIZES.items() if split in (name, None))
+    per_category = sum(
+        size for name, size in datasets.programs.EMBEDDED_SIZES.items() if split in (name, None)
+    )
     assert len(programs) == len(set(programs.ids)) == per_category * (1 if category else 3)
     assert programs.source == "embedded"
     assert "embedded" in programs.describe() and "fetch" in programs.describe()
@@ -58,7 +60,7 @@ def test_embedded_sets_have_their_sizes(no_real_data, category, split):
 def test_embedded_programs_run_and_are_the_same_every_time(no_real_data):
     first = shapeassembly(split="val")
     texts = [program.to_text() for program in first]
-    datasets._embedded.cache_clear()
+    datasets.programs._embedded.cache_clear()
     assert texts == [program.to_text() for program in shapeassembly(split="val")]
     assert all(len(execute(program).cuboids) > 1 for program in first)
 
@@ -76,7 +78,7 @@ def test_a_variation_keeps_structure_and_equal_widths():
     sizes = [i for i, name in enumerate(program.parameter_names()) if ":Cuboid:" in name]
     by_axis = ratio[sizes].reshape(-1, 3)
     assert by_axis.std(dim=0).max() < 1e-3  # sizes are rounded to 4 decimals
-    low, high = datasets.SCALE_RANGE
+    low, high = datasets.programs.SCALE_RANGE
     assert ((low - 1e-3 < by_axis) & (by_axis < high + 1e-3)).all()
     rest = torch.ones(len(ratio), dtype=torch.bool)
     rest[sizes] = False

@@ -7,9 +7,9 @@ from scipy import ndimage
 
 from lib import datasets
 from lib.datasets import DataError, logos
+from lib.datasets import images as dataset_images
+from lib.datasets.images import COLUMNS, ImageSet, fault, in_one_split, split_of
 from lib.furniture import make
-from lib.furniture import silhouettes as furniture_silhouettes
-from lib.furniture.silhouettes import COLUMNS, ImageSet, fault, in_one_split, split_of
 from lib.interpreters.cuboids import Cuboids
 from lib.interpreters.rasterising import FILL, SIZE, VIEWS, box_triangles, silhouettes
 
@@ -186,7 +186,7 @@ def arrays(numbers=(1, 2, 3), splits=("train", "val", "test"), **other):
 def test_embedded_masks_are_the_same_every_time(folder):
     images = datasets.silhouettes()
     assert images.source == "embedded" and "made on the spot" in images.describe()
-    made = furniture_silhouettes.made.__wrapped__  # not the one kept from before
+    made = dataset_images.made.__wrapped__  # not the one kept from before
     first, again = made(5), made(5)
     assert first.ids == again.ids and (first.packed == again.packed).all()
     assert images.packed is datasets.silhouettes("embedded").packed  # made once

@@ -14,6 +14,8 @@ import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
 
+from ..threads import one_thread
+
 _LEVEL_BITS = 10  # how deep operations are nested is below 1,024, because programs are not longer
 _LEVEL = (1 << _LEVEL_BITS) - 1
 _WORKSPACE = {
@@ -104,6 +106,7 @@ def compute(
             torch.bitwise_and(a, b.bitwise_not_() if kind == _SUBTRACT else b, out=room)
 
 
+@one_thread()
 def run(
     tokens: Int[Tensor, "programs length"], canvases: Int[Tensor, "primitives words"]
 ) -> tuple[Int[Tensor, "programs words"], Bool[Tensor, " programs"]]:

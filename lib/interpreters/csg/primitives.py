@@ -22,6 +22,7 @@ from jaxtyping import Int
 from torch import Tensor
 
 from ..quoting import quoted
+from ..threads import one_thread
 from .errors import ProgramError
 from .packing import SIDE, pack_runs
 
@@ -173,6 +174,7 @@ class Primitive:
         return f"{self.kind}({','.join(map(str, self.numbers))})"
 
 
+@one_thread()
 def draw(
     primitives: Sequence[Primitive], dimensions: int, device: torch.device | str = "cpu"
 ) -> Int[Tensor, "n lines"]:

@@ -7,8 +7,8 @@ choice, this is ours:
        frequent [section 4.1: types are uniform]. Every tree of a length is as likely as every other.
     b  [each operation changes the number of ON pixels by at least 10 % of the sum of pixels in two shapes] The result
        differs from both operands, A and B, in at least a tenth of |A| + |B| pixels.
-    c  [the number of ON pixels in the final image is above a threshold] There are as many as the smallest square or cube
-       of the vocabulary has: 12^2 pixels or 7^3 voxels. The paper tells no number. Operands need not reach it.
+    c  [the number of ON pixels in the final image is above a threshold] At least as many as the vocabulary's smallest
+       square or cube has: 12^2 pixels or 7^3 voxels. The paper tells no number. Operands need not reach it.
     d  [boost subtract and intersect] Most pairs of shapes can only be united. So they are tried first for intersections
        and subtractions, with several partners, and united only when all fail; and of the programs that end with a
        union, an intersection, a subtraction as many are kept.
@@ -24,6 +24,7 @@ import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
 
+from ..threads import one_thread
 from .errors import ProgramError
 from .program import LONGEST, Program
 from .vocabulary import vocabulary_of
@@ -31,7 +32,7 @@ from .vocabulary import vocabulary_of
 LENGTHS = {2: (3, 5, 7, 9, 11, 13), 3: (3, 5, 7)}  # tokens, by dimension; the paper's Table 1
 SMALLEST = {2: 12, 3: 7}  # pixels along a side of the vocabulary's smallest square and cube, by dimension
 UNION, INTERSECT, SUBTRACT = range(3)  # operations as they follow the primitives in a vocabulary
-_FEWEST = 32  # programs grown together: among fewer, partners are rare
+_FEWEST = 128  # programs grown together: among fewer, partners are rare
 _MOST = {2: 4096, 3: 2048}  # programs grown together, by dimension: what fits the memory of a small laptop
 _BARREN = 20  # batches without a new program before we give up
 
@@ -78,6 +79,7 @@ def sample(
     return vocabulary_of(dimensions).program(sample_many(rng, 1, length, dimensions, rules)[0])
 
 
+@one_thread()
 def sample_many(
     rng: np.random.Generator, number: int, length: int, dimensions: int = 2, rules: Rules = Rules()
 ) -> Int[Tensor, "number length"]:
@@ -97,7 +99,7 @@ def sample_many(
         if not missing:
             return found[kept]
         before = len(found)
-        more = grow(rng, min(max(missing, _FEWEST), _MOST[dimensions]), length, vocabulary, rules)
+        more = grow(rng, min(max(2 * missing, _FEWEST), _MOST[dimensions]), length, vocabulary, rules)
         found = _distinct(torch.cat([found, more]))
         barren = barren + 1 if len(found) == before else 0
         if barren == _BARREN:

@@ -1,7 +1,7 @@
 """Images without programs: 64x64 masks of furniture that nobody labelled, for training an image parser on.
 
-    images = read("data/silhouettes/furniture.npz", "furniture")     an ImageSet, as the data scripts wrote it
-    images = made(50)                                                the furniture maker's first 50 of each category
+    masks = silhouettes("sweethome3d", split="train")     an ImageSet, as data_scripts.make_silhouettes wrote it
+    masks = silhouettes("embedded")                       the furniture maker's first 50 of each category
 
 A shape's two masks, front and side, are in one split, which a hash of its name decides: 10 in 16 of the shapes are for
 training, 3 for validation, 3 for testing (5K, 1.5K and 1.5K of 8K in CSGNet, section 4.1). No mask is in two splits.
@@ -19,11 +19,15 @@ import torch
 from jaxtyping import Bool, UInt8
 from torch import Tensor
 
-from lib.interpreters.rasterising import FILL, SIZE, VIEWS, box_triangles, silhouettes
+from lib.furniture import make
+from lib.interpreters import rasterising
+from lib.interpreters.rasterising import FILL, SIZE, VIEWS, box_triangles
 
-from .maker import DESIGNS, make
+from .base import CATEGORIES, DataError, choose, data_root
 
 SPLITS = ("train", "val", "test")
+SOURCES = ("shapeassembly", "furniture", "sweethome3d")  # what data_scripts.make_silhouettes knows
+EMBEDDED = 50  # shapes a category, of which there are masks with no download: a second's work
 SHARES = (10, 3, 3)  # sixteenths of the shapes
 BLANK = 2 * FILL  # no more pixels are a line: something without thickness is up to two pixels wide
 FULL = FILL**2 * 98 // 100  # more are a square that leaves nothing to parse
@@ -87,6 +91,47 @@ class ImageSet(Sequence):
         )
 
 
+def silhouettes(source: str | None = None, split: str | None = None) -> ImageSet:
+    """64x64 masks of furniture from the front and the side, without programs; `.source` says whose furniture it is.
+
+    source  "shapeassembly", "furniture" or "sweethome3d", as made by data_scripts.make_silhouettes; "embedded" for
+            a few that are made on the spot; None for all that were made, and where there are none, the embedded ones.
+    split   "train", "val", "test", or None for all: no shape and no mask is in two of them.
+    Raises DataError for another source or split, one that was not made, and files that are damaged.
+    """
+    sources = choose("source", source, (*SOURCES, "embedded"))
+    choose("split", split, SPLITS)
+    folder = data_root() / "silhouettes"
+    if source is None:
+        sources = [name for name in SOURCES if (folder / f"{name}.npz").exists()] or ["embedded"]
+    images = joined([_images(folder, name) for name in sources])
+    return images if split is None else images.select(split)
+
+
+def logos(split: str | None = None) -> ImageSet:
+    """64x64 masks of logos, for testing alone as in CSGNet's paper, so that all of them are in the split "test".
+
+    Raises DataError for another split, and where they were not made with data_scripts.make_logos.
+    """
+    choose("split", split, SPLITS)
+    images = _images(data_root() / "silhouettes", "logos")
+    return images if split is None else images.select(split)
+
+
+def _images(folder: Path, source: str) -> ImageSet:
+    """One source's masks. Raises DataError, with the command that makes them."""
+    if source == "embedded":
+        return made(EMBEDDED)
+    script = "make_logos" if source == "logos" else f"make_silhouettes --source {source}"
+    path = folder / f"{source}.npz"
+    if not path.exists():
+        raise DataError(f"there is no {path}; make it: python -m data_scripts.{script}")
+    try:
+        return read(path, source)
+    except ImageError as error:
+        raise DataError(f"{error}; make it again: python -m data_scripts.{script}") from error
+
+
 def read(path: Path, source: str) -> ImageSet:
     """The masks in a .npz file. Raises ImageError for a file that is missing, damaged or of another kind."""
     try:
@@ -123,7 +168,7 @@ def joined(sets: Sequence[ImageSet]) -> ImageSet:
 def made(count: int) -> ImageSet:
     """The furniture maker's first `count` pieces of each category, as the data script would write them."""
     masks, rows = [], []
-    for category in DESIGNS:
+    for category in CATEGORIES:
         for seed in range(count):
             for view, mask in zip(VIEWS, views_of(category, seed)):
                 if not fault(mask):
@@ -137,7 +182,7 @@ def made(count: int) -> ImageSet:
 
 def views_of(category: str, seed: int) -> Bool[np.ndarray, "2 64 64"]:
     """The masks of one piece of furniture, front and side."""
-    return silhouettes(box_triangles(make(category, seed).leaves))
+    return rasterising.silhouettes(box_triangles(make(category, seed).leaves))
 
 
 def fault(mask: Bool[np.ndarray, "64 64"]) -> str:

@@ -1,0 +1,49 @@
+"""Figures of numbers on pixels: how far each pixel of a picture is from an outline."""
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from torch import Tensor
+
+NUMBERED = 12  # pixels along a side at most, for each to get its number
+RINGS = 8  # pixels from one contour line to the next, where there are no numbers
+MARK = "#d62839"
+
+
+def show_distances(
+    maps: Sequence[Tensor], titles: Sequence[str], marks: Sequence[Tensor] | None = None, *, size: float = 3.0
+) -> Figure:
+    """Maps of distances side by side in one scale, (h, w) px [row y, column x]; light is near, dark is far.
+
+    Small maps show their numbers, rounded to one decimal; large ones a line every 8 px.
+    marks   pixels to frame in red, one bool (h, w) a map.    size   of one map, inches.
+    """
+    if len(titles) != len(maps) or (marks is not None and len(marks) != len(maps)):
+        raise ValueError(f"{len(maps)} maps need as many titles, and as many marks or none")
+    grids = [np.asarray(each, dtype=float) for each in maps]
+    figure, axes = plt.subplots(
+        1, len(grids), figsize=(size * len(grids), size + 0.3), dpi=100, squeeze=False
+    )
+    plt.close(figure)
+    farthest = max(grid.max() for grid in grids)
+    for ax, grid, title in zip(axes[0], grids, titles):
+        ax.imshow(
+            grid, cmap="Blues", vmin=0, vmax=1.6 * farthest
+        )  # 1.6: numbers stay readable on the darkest
+        if max(grid.shape) <= NUMBERED:
+            for (y, x), distance in np.ndenumerate(grid):
+                ax.text(x, y, f"{distance:.1f}", ha="center", va="center", fontsize=7.5)
+        elif farthest > RINGS:
+            ax.contour(grid, np.arange(RINGS, farthest, RINGS), colors="#24344d", linewidths=0.8)
+        ax.set(xticks=[], yticks=[])
+        ax.set_xlabel(title, fontsize=9)
+    for ax, mark in zip(axes[0], [] if marks is None else marks):
+        for y, x in np.argwhere(np.asarray(mark)):
+            ax.add_patch(
+                Rectangle((x - 0.44, y - 0.44), 0.88, 0.88, fill=False, edgecolor=MARK, linewidth=1.4)
+            )
+    figure.tight_layout()
+    return figure

@@ -124,7 +124,7 @@ def test_furniture_is_made_and_read_back(root, capsys):
 
 
 def test_the_embedded_masks_are_the_first_of_these(root, monkeypatch):
-    monkeypatch.setattr(datasets, "EMBEDDED_IMAGES", 4)
+    monkeypatch.setattr(datasets.images, "EMBEDDED", 4)
     furniture(root, 4)
     made, embedded = datasets.silhouettes("furniture"), datasets.silhouettes("embedded")
     assert (

@@ -10,7 +10,7 @@ from matplotlib.patches import FancyBboxPatch
 NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
 INK = "#5b6475"
 
-# name: (x, y, width, text, notebook, colour); x and y of the middle, in a 100 x 46 plan
+# name: (x, y, width, text, notebook, colour); x and y of the middle, in a 126 x 46 plan
 _ROOMS = {
     "parts": (10, 36, 16, "part graphs\nof furniture", "03", "#e8eef6"),
     "program": (36, 36, 17, "ShapeAssembly\nprogram", "01", "#d6e4f5"),
@@ -18,7 +18,8 @@ _ROOMS = {
     "shape": (63, 36, 15, "shape:\nboxes, mesh", "00 01", "#dcefdc"),
     "fit": (63, 10, 15, "fit by\ngradient", "02", "#f6e3d2"),
     "measure": (88, 36, 17, "metrics,\npictures", "06", "#ece4f3"),
-    "others": (88, 10, 19, "CSG, CSG-Stump\nand networks that\nread shapes", "08 to 12", "#f2f2f2"),
+    "csg": (88, 10, 17, "CSG program:\npicture, voxels", "08", "#d6e4f5"),
+    "readers": (114, 10, 19, "networks that\nread shapes;\nCSG-Stump", "09 to 12", "#f6e3d2"),
 }
 # from, to, word, offset of the word from the middle of the arrow
 _DOORS = (
@@ -29,13 +30,15 @@ _DOORS = (
     ("network", "program", "write", (5, 2)),
     ("shape", "fit", "compare", (5.5, 0)),
     ("fit", "program", "change\nnumbers", (6, 2.5)),
-    ("others", "measure", "same\nquestions", (6, -1)),
+    ("csg", "measure", "same\nquestions", (6, -1)),
+    ("csg", "readers", "learn", (0, -4)),
+    ("readers", "csg", "write", (0, 2.5)),
 )
 
 
 def house_map() -> Figure:
     """The flow from data to programs to shapes to networks; small numbers are notebooks, dashed rooms are planned."""
-    figure, ax = plt.subplots(figsize=(8.6, 3.9), dpi=100)
+    figure, ax = plt.subplots(figsize=(10.2, 3.65), dpi=100)
     plt.close(figure)
     built = {path.name[:2] for path in NOTEBOOKS.glob("[0-9][0-9]_*.ipynb")}
     walls = {
@@ -43,7 +46,7 @@ def house_map() -> Figure:
     }
     for start, end, word, offset in _DOORS:
         _door(ax, start, end, walls, word, offset)
-    ax.set(xlim=(0, 100), ylim=(2, 45), aspect="equal")
+    ax.set(xlim=(0, 126), ylim=(2, 45), aspect="equal")
     ax.axis("off")
     figure.subplots_adjust(0, 0, 1, 1)
     return figure
@@ -68,7 +71,9 @@ def _door(ax: Axes, start: str, end: str, walls: dict, word: str, offset: tuple[
     """An arrow between two rooms; it runs beside its opposite where there is one."""
     (x0, y0), (x1, y1) = _ROOMS[start][:2], _ROOMS[end][:2]
     both = any((end, start) == door[:2] for door in _DOORS)
-    aside = (1.6 if y1 > y0 else -1.6) if both else 0
+    level = y0 == y1
+    aside = (1.6 if (x1 < x0 if level else y1 > y0) else -1.6) if both else 0
+    right, up = (0, aside) if level else (aside, 0)
     style = {
         "arrowstyle": "-|>",
         "color": INK,
@@ -76,7 +81,7 @@ def _door(ax: Axes, start: str, end: str, walls: dict, word: str, offset: tuple[
         "patchA": walls[start],
         "patchB": walls[end],
     }
-    ax.annotate("", (x1 + aside, y1), (x0 + aside, y0), arrowprops=style, zorder=1)
+    ax.annotate("", (x1 + right, y1 + up), (x0 + right, y0 + up), arrowprops=style, zorder=1)
     ax.text(
         (x0 + x1) / 2 + offset[0], (y0 + y1) / 2 + offset[1], word, ha="center", fontsize=8.5, color="#1b1f27"
     )

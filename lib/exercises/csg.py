@@ -4,7 +4,6 @@ import random
 from collections.abc import Callable
 from itertools import product
 
-import torch
 from jaxtyping import Bool
 from torch import Tensor
 
@@ -16,7 +15,7 @@ LARGE = 3600  # pixels of exercise 8.2; the most that five tokens can switch on 
 ALIKE = 0.95  # intersection over union of exercise 8.4
 LONGEST = 13  # tokens that a network may write
 LONG_WINDED = "c(24,32,20)c(24,32,12)+s(40,40,16)+s(40,40,16)c(40,40,8)+c(48,48,8)s(40,40,16)*+-"
-_HOUSE = "s(32,40,20)t(32,24,24)+s(48,8,8)+s(32,48,8)-"
+_HOUSE = "s(32,40,20)t(32,24,24)+s(32,48,8)-c(32,24,8)-"
 _WRITTEN = {"primitive": ("c(32,32,16)", "s(24,40,12)", "t(32,24,20)"), "operation": tuple(OPERATIONS)}
 
 

@@ -23,7 +23,7 @@ from jaxtyping import Bool
 from torch import Tensor
 
 from .packing import SIDE
-from .primitives import Primitive, triangle_corners
+from .primitives import Primitive, square_corners, triangle_corners
 from .program import Program
 
 _AT_ONCE = 1 << 17  # points tested in one step: their coordinates stay in the cache
@@ -88,8 +88,7 @@ def voxels(program: Program, resolution: int, device: torch.device | str = "cpu"
 
 def square_edges(x: int, y: int, r: int) -> tuple[float, float, float, float]:
     """Left, right, top and bottom edge of a square, between pixels: its area is the number of its pixels."""
-    half = 1.412 * r / 2
-    left, right, top, bottom = (int(edge) for edge in (x - half, x + half, y - half, y + half))
+    left, right, top, bottom = (int(corner) for corner in square_corners(torch.tensor((x, y, r))))
     return left - 0.5, right + 0.5, top - 0.5, bottom + 0.5
 
 

@@ -45,10 +45,15 @@ def _circle(numbers: Int[Tensor, "n 3"]) -> Runs:
     return x - half, x + half
 
 
-def _square(numbers: Int[Tensor, "n 3"]) -> Runs:
-    x, y, r = numbers.unsqueeze(-1).unbind(1)
+def square_corners(numbers: Int[Tensor, "*n 3"]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """First and last column, first and last row of each square, as whole numbers."""
+    x, y, r = numbers.unbind(-1)
     half = 1.412 * r.double() / 2
-    left, right, top, bottom = (edge.trunc().long() for edge in (x - half, x + half, y - half, y + half))
+    return tuple(corner.trunc().long() for corner in (x - half, x + half, y - half, y + half))
+
+
+def _square(numbers: Int[Tensor, "n 3"]) -> Runs:
+    left, right, top, bottom = (corner.unsqueeze(-1) for corner in square_corners(numbers))
     rows = torch.arange(SIDE, device=numbers.device)
     return _where((top <= rows) & (rows <= bottom), left, right)
 

@@ -23,7 +23,7 @@ from torch import Tensor
 from ..quoting import quoted
 from .errors import ProgramError
 from .packing import SIDE
-from .primitives import KINDS, Primitive, draw, triangle_corners
+from .primitives import KINDS, Primitive, draw, square_corners, triangle_corners
 from .program import OPERATIONS, STOP, Operation, Program
 
 CENTERS, SIZES = range(8, 57, 8), range(8, 33, 4)
@@ -116,21 +116,18 @@ def vocabulary_of(dimensions: int) -> Vocabulary:
 
 def _fits(primitive: Primitive) -> bool:
     """Does the rule above hold?"""
-    *center, size = primitive.numbers if primitive.kind != "cy" else primitive.numbers[:4]
+    if primitive.kind in ("s", "t"):
+        corners = square_corners if primitive.kind == "s" else triangle_corners
+        return all(0 <= int(corner) < SIDE for corner in corners(torch.tensor(primitive.numbers)))
+    *center, size = primitive.numbers[: primitive.dimensions + 1]
     if primitive.kind == "c":
         return all(size <= k < SIDE - size for k in center)
-    if primitive.kind == "s":
-        half = 1.412 * size / 2
-        return all(int(k - half) >= 0 and int(k + half) < SIDE for k in center)
-    if primitive.kind == "t":
-        corners = torch.stack(triangle_corners(torch.tensor(primitive.numbers)))
-        return bool(((corners >= 0) & (corners < SIDE)).all())
+    if primitive.kind == "sp":
+        return all(size <= k <= SIDE - size for k in center)
     if primitive.kind == "cu":
-        return all(size / 2 <= k < SIDE - size / 2 for k in center)
-    round_in = center if primitive.kind == "sp" else center[:2]
-    standing = primitive.kind == "sp" or _stands(center[2], primitive.numbers[4])
-    return all(size <= k <= SIDE - size for k in round_in) and standing
+        return all(_has_room(k, size) for k in center)
+    return all(size <= k <= SIDE - size for k in center[:2]) and _has_room(center[2], primitive.numbers[-1])
 
 
-def _stands(z: int, height: int) -> bool:
-    return height / 2 <= z < SIDE - height / 2
+def _has_room(center: int, length: int) -> bool:
+    return length / 2 <= center < SIDE - length / 2

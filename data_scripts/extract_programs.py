@@ -22,11 +22,11 @@ from pathlib import Path, PurePosixPath
 
 from tqdm import tqdm
 
+from data_scripts.ending import exit_code
 from data_scripts.extraction_worker import UNREADABLE, extract_chunk
 from data_scripts.journal import Journal, code_digest, write_whole
 from data_scripts.parallel import in_parallel
 from lib.datasets import CATEGORIES, DataError
-from lib.extractor import PartGraphError
 from lib.extractor.files import sources
 
 CHUNK = 32  # files a worker takes at once; fixed, because a batch of shapes is executed together
@@ -166,8 +166,8 @@ def report(out: Path, rows: list[dict]) -> dict:
     return summary
 
 
-def run(options: argparse.Namespace) -> int:
-    """Extract, report, say so in one line; returns the exit code. Raises DataError and PartGraphError."""
+def run(options: argparse.Namespace) -> None:
+    """Extract, report, say so in one line. Raises DataError and PartGraphError."""
     started = time.monotonic()
     rows, count = extract_all(options)
     speed = count / (time.monotonic() - started)
@@ -183,7 +183,6 @@ def run(options: argparse.Namespace) -> int:
         f"{f'rejected: {reasons}, ' if reasons else ''}"
         f"{count} extracted now at {speed:.1f} shapes/s; kept in {options.out}"
     )
-    return 0
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -203,17 +202,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.workers < 1 and options.workers != -1:
         parser.error("--workers must be 1 or more")
-    try:
-        return run(options)
-    except (DataError, PartGraphError) as error:
-        print(f"{type(error).__name__}: {error}", file=sys.stderr)
-        return 1
-    except OSError as error:
-        print(f"could not write to {options.out}: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted; the same command goes on from here", file=sys.stderr)
-        return 130
+    return exit_code(lambda: run(options))
 
 
 if __name__ == "__main__":

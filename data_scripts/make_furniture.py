@@ -14,6 +14,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from data_scripts.ending import exit_code
 from lib.datasets import CATEGORIES, DataError, data_root
 from lib.furniture import make
 
@@ -45,6 +46,14 @@ def write_all(categories: list[str], count: int, seed: int, out: Path) -> int:
         raise DataError(f"could not write to {out}: {error}") from error
 
 
+def run(options: argparse.Namespace) -> None:
+    """Make what the options say, and tell how much it was. Raises DataError."""
+    categories = [options.category] if options.category else list(CATEGORIES)
+    written = write_all(categories, options.count, options.seed, options.out)
+    total = options.count * len(categories)
+    print(f"{total} part graphs ({', '.join(categories)}) in {options.out}; {written} of them written now")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns the exit code. Problems are one line on stderr."""
     parser = argparse.ArgumentParser(
@@ -57,18 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.count < 1 or options.seed < 0:
         parser.error("--count must be 1 or more, --seed 0 or more")
-    categories = [options.category] if options.category else list(CATEGORIES)
-    try:
-        written = write_all(categories, options.count, options.seed, options.out)
-    except DataError as error:
-        print(f"DataError: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted; the same command goes on from here", file=sys.stderr)
-        return 130
-    total = options.count * len(categories)
-    print(f"{total} part graphs ({', '.join(categories)}) in {options.out}; {written} of them written now")
-    return 0
+    return exit_code(lambda: run(options))
 
 
 if __name__ == "__main__":

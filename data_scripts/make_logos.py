@@ -29,6 +29,7 @@ import numpy as np
 from tqdm import tqdm
 
 from data_scripts import mask_files
+from data_scripts.ending import exit_code
 from data_scripts.mask_files import Drawn
 from data_scripts.packages import Package, obtain
 from lib.datasets import DataError, data_root
@@ -127,18 +128,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=data_root() / "silhouettes", help="default: %(default)s")
     parser.add_argument("--sheet", action="store_true", help="write a contact sheet, too")
     options = parser.parse_args(arguments)
-    try:
-        print(make(options))
-    except DataError as error:
-        print(f"DataError: {error}", file=sys.stderr)
-        return 1
-    except OSError as error:
-        print(f"DataError: a file cannot be read or written: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted: nothing was changed", file=sys.stderr)
-        return 130
-    return 0
+    return exit_code(lambda: print(make(options)), "interrupted: nothing was changed")
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ import torch
 from tqdm import tqdm
 
 from data_scripts import mask_files, sweethome
+from data_scripts.ending import exit_code
 from data_scripts.fetch_shapeassembly import digest, read_folder
 from data_scripts.journal import write_whole
 from data_scripts.mask_files import Drawn
@@ -190,6 +191,12 @@ def make_one(name: str, options: argparse.Namespace) -> str:
     return line
 
 
+def make_all(options: argparse.Namespace) -> None:
+    """Make the sources that the options name, a line for each. Raises DataError."""
+    for name in dict.fromkeys(options.source or SOURCES):
+        print(make_one(name, options))
+
+
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns the exit code: 0 made, 1 a problem, 130 interrupted. Problems are one line on stderr."""
     parser = argparse.ArgumentParser(
@@ -212,19 +219,9 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error("--workers must be 1 or more")
     if options.count < 1:
         parser.error("--count must be 1 or more")
-    try:
-        for name in dict.fromkeys(options.source or SOURCES):
-            print(make_one(name, options))
-    except DataError as error:
-        print(f"DataError: {error}", file=sys.stderr)
-        return 1
-    except OSError as error:
-        print(f"DataError: a file cannot be read or written: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted; what was finished stays, the same command makes the rest", file=sys.stderr)
-        return 130
-    return 0
+    return exit_code(
+        lambda: make_all(options), "interrupted; what was finished stays, the same command makes the rest"
+    )
 
 
 if __name__ == "__main__":

@@ -363,7 +363,7 @@ def test_a_folder_that_cannot_be_written(furniture, tmp_path, capsys, quick):
         extract_programs.main([str(furniture), "--out", str(tmp_path / "file" / "out"), "--workers", "1"])
         == 1
     )
-    assert "could not write to" in capsys.readouterr().err
+    assert "cannot be read or written" in capsys.readouterr().err
 
 
 def test_a_journal_of_something_else(tmp_path):

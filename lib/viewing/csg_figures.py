@@ -19,7 +19,7 @@ def show_distances(
     """Maps of distances side by side in one scale, (h, w) px [row y, column x]; light is near, dark is far.
 
     Small maps show their numbers, rounded to one decimal; large ones a line every 8 px.
-    marks   pixels to frame in red, one bool (h, w) a map.    size   of one map, inches.
+    marks   pixels to mark in red, one bool (h, w) a map.    size   of one map, inches.
     """
     if len(titles) != len(maps) or (marks is not None and len(marks) != len(maps)):
         raise ValueError(f"{len(maps)} maps need as many titles, and as many marks or none")
@@ -41,9 +41,10 @@ def show_distances(
         ax.set(xticks=[], yticks=[])
         ax.set_xlabel(title, fontsize=9)
     for ax, mark in zip(axes[0], [] if marks is None else marks):
+        large = max(mark.shape) > NUMBERED  # no frame, but all of the pixel
+        side = 1.0 if large else 0.88
         for y, x in np.argwhere(np.asarray(mark)):
-            ax.add_patch(
-                Rectangle((x - 0.44, y - 0.44), 0.88, 0.88, fill=False, edgecolor=MARK, linewidth=1.4)
-            )
+            place = (x - side / 2, y - side / 2)
+            ax.add_patch(Rectangle(place, side, side, fill=large, color=MARK, linewidth=0 if large else 1.4))
     figure.tight_layout()
     return figure

@@ -16,8 +16,8 @@ from torch import Tensor
 
 from ..threads import one_thread
 
-_LEVEL_BITS = 10  # how deep operations are nested is below 1,024, because programs are not longer
-_LEVEL = (1 << _LEVEL_BITS) - 1
+_LEVEL_BIT = 40  # an entry of the stack: from this bit on its level, below it the number of the picture
+_LEVEL = 1 << _LEVEL_BIT
 _WORKSPACE = {
     "cpu": 1 << 20,
     "cuda": 1 << 27,
@@ -45,45 +45,49 @@ class Plan:
 def plan(tokens: Int[Tensor, "length programs"], primitives: int) -> Plan:
     """Find every operation's operands, and which programs are valid. Tokens: primitives, then + * - and stop."""
     length, programs = tokens.shape
-    draws, operates, depth, valid = _stack_depths(tokens, primitives)
-    top = (depth - 1).clamp_(min=0).long()
+    operates, top, valid = _stack_places(tokens, primitives)
     number = primitives + torch.arange(length * programs, device=tokens.device).view(length, programs)
-    entry = (
-        torch.where(draws, tokens, number) << _LEVEL_BITS
-    )  # of the stack: picture and, in the low bits, its level
-    stack = entry.new_zeros((length // 2 + 3, programs))
-    latest, lefts, rights, levels = stack[0], [], [], []
-    for at, draw, operate, new in zip(top.split(1), draws.unbind(), operates.unbind(), entry.unbind()):
-        below = stack.gather(0, at)[
-            0
-        ]  # an operation replaces two entries: the latest, and the one it finds on top
-        level = torch.maximum(below & _LEVEL, latest & _LEVEL).add_(1)
-        lefts.append(below), rights.append(latest), levels.append(level)
-        latest = torch.where(draw, new, torch.where(operate, new + level, below))
-        stack.scatter_(0, at, latest.unsqueeze(0))
-    result = torch.where(valid, latest >> _LEVEL_BITS, -1)
+    stack = tokens.new_zeros((length // 2 + 3, programs))
+    lefts, entries = [], [stack[:1]]
+    for at, operate, token, made in zip(*(x.split(1) for x in (top, operates, tokens, number + _LEVEL))):
+        left, right = (
+            stack.gather(0, at),
+            entries[-1],
+        )  # an operation finds its left operand where it will stand itself
+        deepest = torch.maximum(left, right).bitwise_and_(-_LEVEL)
+        entry = torch.where(operate, deepest.add_(made), token)
+        stack.scatter_(0, at, entry)
+        lefts.append(left), entries.append(entry)
+    result = torch.where(valid, stack[0] & _LEVEL - 1, -1)
     operation = (operates & valid).flatten().nonzero().squeeze(1)
-    level, kind = (
-        each.index_select(0, operation) for each in (torch.cat(levels), tokens.flatten() - primitives)
-    )
-    round_of, order = (3 * level + kind).sort()
-    operation = operation.index_select(0, order)
+    columns = (torch.cat(lefts), torch.cat(entries[:-1]), torch.cat(entries[1:]), tokens - primitives)
+    left, right, made, kind = (each.flatten().index_select(0, operation) for each in columns)
+    round_of, order = (3 * (made >> _LEVEL_BIT) + kind).sort()
     kinds, many = (each.tolist() for each in round_of.unique_consecutive(return_counts=True))
-    left, right = (torch.cat(each).index_select(0, operation) >> _LEVEL_BITS for each in (lefts, rights))
-    return Plan(primitives + operation, left, right, [(k % 3, n) for k, n in zip(kinds, many)], result)
+    makes, left, right = (
+        each.index_select(0, order) & _LEVEL - 1 for each in (operation + primitives, left, right)
+    )
+    return Plan(makes, left, right, [(k % 3, n) for k, n in zip(kinds, many)], result)
 
 
-def _stack_depths(tokens: Tensor, primitives: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Which places draw, which operate, how many pictures wait after each (at most what memory has), who is valid."""
+def _stack_places(tokens: Tensor, primitives: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Which places operate, where on the stack each leaves its picture, and which programs are valid.
+
+    What comes after the stop, and what finds no room on the stack of any valid program, goes to the stack's last place.
+    """
     running = tokens != primitives + _STOP
     for before, here in pairwise(running.unbind()):
         here &= before
-    draws, operates = running & (tokens < primitives), running & (tokens >= primitives)
-    depth = draws.short() - operates.short()
+    operates = running & (tokens >= primitives)
+    depth = running.short() - 2 * operates.short()
     for before, here in pairwise(depth.unbind()):
         here += before
-    valid = ((depth > 0) | ~running).all(0)
-    return draws, operates, depth.clamp_(max=len(tokens) // 2 + 2), valid & (depth[-1] == 1)
+    valid = depth[-1] == 1
+    for here in ((depth > 0) | ~running).unbind():
+        valid &= here
+    last = len(tokens) // 2 + 2
+    top = torch.where(running & (depth > 0), depth - 1, last).clamp_(max=last).long()
+    return operates, top, valid
 
 
 def compute(
@@ -118,23 +122,30 @@ def run(
     device = canvases.device
     pictures = canvases.new_empty((programs, words))
     valid = torch.empty(programs, dtype=torch.bool, device=device)
-    step = max(
-        1, min(programs, _WORKSPACE.get(device.type, _WORKSPACE["cuda"]) // (words * max(1, length // 2)))
-    )
+    room = _WORKSPACE.get(device.type, _WORKSPACE["cuda"])
+    step = max(1, min(programs, room // (words * max(1, length // 2))))
     workspace = canvases.new_empty((1 + min(primitives, step * length) + step * (length // 2), words))
     workspace[0] = 0
     for begin in range(0, programs, step):
         some = tokens[begin : begin + step].t().contiguous()
         planned = plan(some, primitives)
-        drawn = torch.zeros(primitives + 4, dtype=torch.bool, device=device)
-        drawn[some.flatten()] = True
-        drawn = drawn[:primitives].nonzero().squeeze(1)
-        start = 1 + len(drawn)
-        torch.index_select(canvases, 0, drawn, out=workspace[1:start])
-        row = drawn.new_empty(primitives + some.numel())
-        row[drawn] = torch.arange(1, start, device=device)
+        row, start = _load(some, canvases, workspace)
         compute(planned, row, workspace, start)
         valid[begin : begin + step] = planned.result >= 0
         result = torch.where(planned.result < 0, 0, row[planned.result])  # row 0 is blank
         torch.index_select(workspace, 0, result, out=pictures[begin : begin + step])
     return pictures, valid
+
+
+def _load(tokens: Tensor, canvases: Tensor, workspace: Tensor) -> tuple[Int[Tensor, " pictures"], int]:
+    """Copy the canvases that are drawn to the workspace, from row 1 on. Returns where each picture stands, as far as
+    that is known, and the first free row."""
+    primitives = len(canvases)
+    drawn = torch.zeros(primitives + 4, dtype=torch.bool, device=tokens.device)
+    drawn[tokens.flatten()] = True
+    drawn = drawn[:primitives].nonzero().squeeze(1)
+    start = 1 + len(drawn)
+    torch.index_select(canvases, 0, drawn, out=workspace[1:start])
+    row = drawn.new_empty(primitives + tokens.numel())
+    row[drawn] = torch.arange(1, start, device=tokens.device)
+    return row, start

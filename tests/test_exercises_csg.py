@@ -19,7 +19,7 @@ from lib.interpreters.csg.packing import count
 from lib.metrics.images import iou
 
 PICTURES = [check_empty, check_large, check_short, check_house]
-HOUSE = "s(32,40,20)t(32,24,24)+s(48,8,8)+s(32,48,8)-"
+HOUSE = "s(32,40,20)t(32,24,24)+s(32,48,8)-c(32,24,8)-"
 SHORT = "c(24,32,20)s(40,40,16)-"
 
 
@@ -47,6 +47,7 @@ WRONG = {
     "no single primitive": (lambda tokens: len(tokens) > 1 and right(tokens), "it says False"),
     "one symbol": (lambda tokens: right([t.replace("*", "c") for t in tokens]), "it says"),
     "raises": (lambda tokens: min(depths(tokens)) > 0, r"for \[\] it raises ValueError"),
+    "no yes or no": (lambda tokens: torch.zeros(2), "it raises RuntimeError"),
     "no function": ("def", "is a function"),
     "called": (True, "without brackets"),
 }
@@ -59,6 +60,8 @@ def test_unanswered(check):
 
 def test_validity():
     assert check_validity(right) == "ok"
+    assert check_validity(lambda tokens: None) == "not answered yet"
+    assert check_validity(lambda tokens: True if right(tokens) else None) == "ok"
 
     def greedy(tokens):  # eats the list it was given
         waiting = 0
@@ -132,7 +135,7 @@ def test_short():
 
 def test_house():
     assert check_house(HOUSE) == "ok" and iou(execute(parse(HOUSE)).image, house()) == 1
-    without = {"door": "s(32,40,20)t(32,24,24)+s(48,8,8)+", "chimney": "s(32,40,20)t(32,24,24)+s(32,48,8)-"}
+    without = {"door": "s(32,40,20)t(32,24,24)+c(32,24,8)-", "window": "s(32,40,20)t(32,24,24)+s(32,48,8)-"}
     for part, text in without.items():
         assert "will do" in check_house(text), part
     assert "15 tokens" in check_house(HOUSE + "s(32,48,8)-" * 4)

@@ -25,7 +25,10 @@ def house() -> Bool[Tensor, "64 64"]:
 
 
 def check_validity(answer: object) -> str:
-    """Exercise 8.1: a function from a list of tokens (texts) to whether they are one whole program."""
+    """Exercise 8.1: a function from a list of tokens (texts) to whether they are one whole program.
+
+    One that returns None even for a single primitive has not been written yet.
+    """
     if answer is None:
         return UNANSWERED
     if not callable(answer):
@@ -40,10 +43,13 @@ def _compared(answer: Callable) -> str:
         for pattern in product(_WRITTEN, repeat=length):
             tokens = [pick.choice(_WRITTEN[role]) for role in pattern]
             try:
-                found = bool(answer(list(tokens)))
+                found = answer(list(tokens))
+                yes = bool(found)
             except Exception as error:  # whatever is wrong with a reader's function, it becomes a hint
                 return hint(f"for {tokens} it raises {type(error).__name__} ({str(error)[:80]})")
-            if found != _is_program(tokens):
+            if found is None and length == 1 and _is_program(tokens):
+                return UNANSWERED
+            if yes != _is_program(tokens):
                 return hint(f"for {tokens} it says {found}")
     return OK
 

@@ -91,8 +91,8 @@ def grow(
 def _split_chances(operations: int) -> np.ndarray:
     """How likely the left operand has 0, 1, 2, … operations, where every tree is as likely as every other."""
     trees = [comb(2 * k, k) // (k + 1) for k in range(operations)]  # with k operations: the Catalan numbers
-    ways = np.array([a * b for a, b in zip(trees, reversed(trees))])
-    return (ways / ways.sum()).astype(float)
+    ways = [a * b for a, b in zip(trees, reversed(trees))]  # of long programs, more than 64 bits can hold
+    return np.array([way / sum(ways) for way in ways])
 
 
 def _draw(rng: np.random.Generator, number: int, vocabulary: Vocabulary) -> _Parts:

@@ -18,10 +18,7 @@ from ..threads import one_thread
 
 _LEVEL_BIT = 40  # an entry of the stack: from this bit on its level, below it the number of the picture
 _LEVEL = 1 << _LEVEL_BIT
-_WORKSPACE = {
-    "cpu": 1 << 20,
-    "cuda": 1 << 27,
-}  # words worked on in one go: what a core's cache holds, or a GPU
+_WORKSPACE = {"cpu": 1 << 20, "cuda": 1 << 27}  # words worked on in one go: some of a cache, or of a GPU
 _UNION, _INTERSECT, _SUBTRACT, _STOP = range(4)  # how tokens go on after the primitives
 
 
@@ -38,7 +35,7 @@ class Plan:
     right: Int[Tensor, " operations"]
     rounds: list[
         tuple[int, int]
-    ]  # (0 union, 1 intersect or 2 subtract, how many), in the order of the operations
+    ]  # 0 union, 1 intersect or 2 subtract, and how many, in the operations' order
     result: Int[Tensor, " programs"]
 
 
@@ -50,11 +47,8 @@ def plan(tokens: Int[Tensor, "length programs"], primitives: int) -> Plan:
     stack = tokens.new_zeros((length // 2 + 3, programs))
     lefts, entries = [], [stack[:1]]
     for at, operate, token, made in zip(*(x.split(1) for x in (top, operates, tokens, number + _LEVEL))):
-        left, right = (
-            stack.gather(0, at),
-            entries[-1],
-        )  # an operation finds its left operand where it will stand itself
-        deepest = torch.maximum(left, right).bitwise_and_(-_LEVEL)
+        left = stack.gather(0, at)  # an operation finds its left operand where its result will stand
+        deepest = torch.maximum(left, entries[-1]).bitwise_and_(-_LEVEL)
         entry = torch.where(operate, deepest.add_(made), token)
         stack.scatter_(0, at, entry)
         lefts.append(left), entries.append(entry)

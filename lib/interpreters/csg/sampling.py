@@ -17,7 +17,7 @@ choice, this is ours:
 How programs grow until they follow these rules is told in `growing`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -34,7 +34,10 @@ SMALLEST = {2: 12, 3: 7}  # pixels along a side of the vocabulary's smallest squ
 UNION, INTERSECT, SUBTRACT = range(3)  # operations as they follow the primitives in a vocabulary
 _FEWEST = 128  # programs grown together: among fewer, partners are rare
 _MOST = {2: 4096, 3: 2048}  # programs grown together, by dimension: what fits the memory of a small laptop
-_BARREN = 20  # batches without a new program before we give up
+_EQUAL, _BARREN = (
+    3,
+    20,
+)  # batches in a row that bring nothing: then all operations are tried alike; then we give up
 
 
 @dataclass(frozen=True)
@@ -75,8 +78,9 @@ def sample(
     rng: np.random.Generator, dimensions: int = 2, length: int | None = None, rules: Rules = Rules()
 ) -> Program:
     """One random program that follows the rules; its length is one of the paper's, unless given (an odd number)."""
+    vocabulary = vocabulary_of(dimensions)
     length = int(rng.choice(LENGTHS[dimensions])) if length is None else length
-    return vocabulary_of(dimensions).program(sample_many(rng, 1, length, dimensions, rules)[0])
+    return vocabulary.program(sample_many(rng, 1, length, dimensions, rules)[0])
 
 
 @one_thread()
@@ -85,26 +89,29 @@ def sample_many(
 ) -> Int[Tensor, "number length"]:
     """Tokens of `number` different random programs of `length` tokens each, all following the rules.
 
-    Raises ProgramError for a length that no program has, and where hardly a program follows the rules.
+    Raises ProgramError for a number or a length that cannot be, and where hardly a program follows the rules.
     """
     from .growing import grow
 
+    if number < 0:
+        raise ProgramError(f"{number} programs", expected="a whole number, at least 0")
     if length < 1 or length % 2 == 0 or length > LONGEST:
         raise ProgramError(f"programs of {length} tokens", expected=f"an odd number from 1 to {LONGEST}")
     vocabulary = vocabulary_of(dimensions)
     quotas = _quotas(rng, number) if rules.balanced and length > 1 else None
-    found, barren = torch.empty((0, length), dtype=torch.int64), 0
+    found, before, barren = torch.empty((0, length), dtype=torch.int64), -1, 0
     while True:
         kept, missing = _kept(found[:, -1] - len(vocabulary.primitives), number, quotas)
         if not missing:
             return found[kept]
-        before = len(found)
-        more = grow(rng, min(max(2 * missing, _FEWEST), _MOST[dimensions]), length, vocabulary, rules)
-        found = _distinct(torch.cat([found, more]))
-        barren = barren + 1 if len(found) == before else 0
+        barren, before = barren + 1 if len(kept) == before else 0, len(kept)
         if barren == _BARREN:
             what = f"found only {before} programs of {length} tokens that follow {rules}"
             raise ProgramError(what, expected=f"{number} of them: choose weaker rules, or longer programs")
+        # Where next to any pair follows the rules, intersections and subtractions, tried first, leave none to unite.
+        weights = rules if barren < _EQUAL else replace(rules, balanced=False)
+        more = grow(rng, min(max(2 * missing, _FEWEST), _MOST[dimensions]), length, vocabulary, weights)
+        found = _distinct(torch.cat([found, more]))
 
 
 def _quotas(rng: np.random.Generator, number: int) -> list[int]:

@@ -14,6 +14,7 @@ of workers, and however often the run was interrupted: a killed run goes on from
 import argparse
 import io
 import json
+import shutil
 import sys
 import time
 from collections.abc import Iterator
@@ -23,6 +24,7 @@ import numpy as np
 from tqdm import tqdm
 
 from data_scripts.csg_worker import Chunk, make_chunk
+from data_scripts.ending import exit_code
 from data_scripts.journal import code_digest, write_whole
 from data_scripts.parallel import in_parallel
 from lib.datasets import CSG_SIZES, CSG_SPLITS, DataError, data_root
@@ -55,9 +57,9 @@ class Parts:
         self.folder = folder
         text = json.dumps(settings)
         made = folder / "settings.json"
-        if made.exists() and made.read_text() != text:
+        if made.exists() and (begun := made.read_text(errors="replace")) != text:
             raise DataError(
-                f"{folder} holds the beginning of something else ({made.read_text()}, wanted {text}); "
+                f"{folder} holds the beginning of something else ({begun}, wanted {text}); "
                 "remove it, or choose another --out"
             )
         write_whole(made, text.encode())
@@ -73,16 +75,16 @@ class Parts:
     def read(self, chunk: Chunk) -> np.ndarray:
         path = self.path(chunk)
         try:
-            return np.load(path)
+            tokens = np.lib.format.read_array(io.BytesIO(path.read_bytes()))  # unpickles nothing
+            if tokens.dtype != np.uint16 or tokens.ndim != 2 or tokens.shape[1] != chunk[1]:
+                raise ValueError(
+                    f"found {tokens.dtype} {tokens.shape}, expected uint16 (programs, {chunk[1]})"
+                )
+            return tokens
         except (ValueError, EOFError) as error:
             raise DataError(
                 f"{path} is damaged ({error}); remove it, and the same command makes it again"
             ) from error
-
-    def remove(self) -> None:
-        for path in self.folder.iterdir():
-            path.unlink()
-        self.folder.rmdir()
 
 
 def make_all(options: argparse.Namespace, parts: Parts, wanted: dict[int, int]) -> dict[int, np.ndarray]:
@@ -170,29 +172,40 @@ def write(path: Path, arrays: dict[str, np.ndarray]) -> None:
     write_whole(path, file.getvalue())
 
 
-def run(options: argparse.Namespace) -> int:
-    """Make the file, say what is in it; returns the exit code. Raises DataError."""
+def run(options: argparse.Namespace) -> None:
+    """Make the file, say what is in it. Raises DataError."""
     started = time.monotonic()
     name = f"programs_{options.dimensions}d"
     path, told = options.out / f"{name}.npz", options.out / f"{name}.json"
     settings = {"dimensions": options.dimensions, "seed": options.seed, "share": options.share}
     settings["code"] = code_digest("interpreters/csg")
-    if path.exists() and told.exists() and settings.items() <= json.loads(told.read_text()).items():
+    if path.exists() and settings.items() <= _read(told).items():
         print(f"{path} is there already, made with the same settings: nothing to do")
-        return 0
-    told.unlink(missing_ok=True)  # from here on the two files might not belong together
+        shutil.rmtree(
+            options.out / f"{name}.parts", ignore_errors=True
+        )  # a run killed in the end may have left them
+        return
     wanted = sizes(options.dimensions, options.share)
     parts = Parts(options.out / f"{name}.parts", settings)
+    told.unlink(missing_ok=True)  # from here on the two files might not belong together
     programs = make_all(options, parts, {length: sum(row.values()) for length, row in wanted.items()})
     arrays = split_up(programs, wanted, options)
     write(path, arrays)
     content = summary(arrays, settings)
     write_whole(told, (json.dumps(content, indent=2) + "\n").encode())
-    parts.remove()
+    shutil.rmtree(parts.folder)
     print(
         f"{_told(content)}; {path.stat().st_size / 1e6:.1f} MB, {time.monotonic() - started:.0f} s, in {path}"
     )
-    return 0
+
+
+def _read(told: Path) -> dict:
+    """The JSON file; nothing where there is none, or a damaged one, beside which the programs are made again."""
+    try:
+        content = json.loads(told.read_text())
+    except (FileNotFoundError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
 def _told(content: dict) -> str:
@@ -230,17 +243,7 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error("--share must be more than 0 and at most 1")
     if options.seed < 0:
         parser.error("--seed must be 0 or more")
-    try:
-        return run(options)
-    except DataError as error:
-        print(f"DataError: {error}", file=sys.stderr)
-        return 1
-    except OSError as error:
-        print(f"could not write to {options.out}: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted; the same command goes on from here", file=sys.stderr)
-        return 130
+    return exit_code(lambda: run(options))
 
 
 if __name__ == "__main__":

@@ -2,14 +2,14 @@
 
 One thread, as the authors' figures were taken: 466 programs of the plane a second for equal shares of the lengths 3 to
 13, and 5 of space with primitives drawn on the fly. The programs are random and valid; every primitive of the
-networks' vocabularies has been drawn before.
+networks' vocabularies has been drawn before. Programs are also sampled, for which there are no figures of the authors.
 """
 
 import numpy as np
 import pytest
 import torch
 
-from lib.interpreters.csg import execute, execute_many, parse, vocabulary_of
+from lib.interpreters.csg import execute, execute_many, parse, sample_many, vocabulary_of
 from tests.csg_programs import random_mixture, random_program
 
 AUTHORS = {2: 1 / 466, 3: 1 / 5}  # seconds a program
@@ -81,3 +81,13 @@ def test_parse(bench, tokens):
     texts = [vocabulary_of(2).program(row).to_text() for row in tokens[2][:2000]]
     programs = bench(lambda: [parse(text) for text in texts], "parse one program of the plane", len(texts))
     assert [program.to_text() for program in programs] == texts
+
+
+@pytest.mark.parametrize("dimensions, length, count", [(2, 13, 4000), (3, 7, 1000)])
+def test_sample(bench, tokens, dimensions, length, count):
+    """Random programs that follow the paper's rules, as data sets are made of: the longest, which take longest."""
+    what = f"sample programs of {length} tokens in {WHERE[dimensions]}"
+    made = bench(
+        lambda: sample_many(np.random.default_rng(0), count, length, dimensions), what, count, rounds=3
+    )
+    assert made.shape == (count, length)

@@ -112,7 +112,6 @@ def _padded(parts: list[Tensor], vocabulary: Vocabulary) -> Int[Tensor, "n longe
 def _embedded(dimensions: int, length: int) -> dict[str, Int[Tensor, "n length"]]:
     rng = np.random.default_rng([0, dimensions, length])
     tokens = sample_many(rng, sum(EMBEDDED.values()), length, dimensions)
-    tokens = tokens[torch.from_numpy(rng.permutation(len(tokens)))]
     return dict(zip(EMBEDDED, tokens.split(list(EMBEDDED.values()))))
 
 

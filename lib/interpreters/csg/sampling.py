@@ -34,10 +34,8 @@ SMALLEST = {2: 12, 3: 7}  # pixels along a side of the vocabulary's smallest squ
 UNION, INTERSECT, SUBTRACT = range(3)  # operations as they follow the primitives in a vocabulary
 _FEWEST = 128  # programs grown together: among fewer, partners are rare
 _MOST = {2: 4096, 3: 2048}  # programs grown together, by dimension: what fits the memory of a small laptop
-_EQUAL, _BARREN = (
-    3,
-    20,
-)  # batches in a row that bring nothing: then all operations are tried alike; then we give up
+_EQUAL = 3  # batches in a row that bring nothing before all operations are tried equally often
+_BARREN = 20  # and before we give up
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,7 @@ def sample(
 def sample_many(
     rng: np.random.Generator, number: int, length: int, dimensions: int = 2, rules: Rules = Rules()
 ) -> Int[Tensor, "number length"]:
-    """Tokens of `number` different random programs of `length` tokens each, all following the rules.
+    """Tokens of `number` different random programs of `length` tokens each, all following the rules, in random order.
 
     Raises ProgramError for a number or a length that cannot be, and where hardly a program follows the rules.
     """
@@ -103,7 +101,7 @@ def sample_many(
     while True:
         kept, missing = _kept(found[:, -1] - len(vocabulary.primitives), number, quotas)
         if not missing:
-            return found[kept]
+            return found[kept][torch.from_numpy(rng.permutation(number))]  # rare endings were found last
         barren, before = barren + 1 if len(kept) == before else 0, len(kept)
         if barren == _BARREN:
             what = f"found only {before} programs of {length} tokens that follow {rules}"
@@ -126,7 +124,7 @@ def _kept(last: Int[Tensor, " found"], number: int, quotas: list[int] | None) ->
         return torch.arange(min(number, len(last))), max(0, number - len(last))
     rows = [(last == operation).nonzero().squeeze(1) for operation in range(3)]
     missing = max(quota - len(each) for quota, each in zip(quotas, rows))
-    return torch.cat([each[:quota] for each, quota in zip(rows, quotas)]).sort().values, max(0, 3 * missing)
+    return torch.cat([each[:quota] for each, quota in zip(rows, quotas)]), max(0, 3 * missing)
 
 
 def _distinct(tokens: Tensor) -> Tensor:

@@ -22,7 +22,7 @@ class Journal:
         lines = _whole_lines(path)
         if lines and lines[0] != settings:
             raise DataError(
-                f"{path} was made with other settings ({_difference(lines[0], settings)}); {_ADVICE}"
+                f"{path} was made with other settings ({difference(lines[0], settings)}); {_ADVICE}"
             )
         self.rows = {row["name"]: row for row in lines[1:]}
         self._rewrite()
@@ -87,7 +87,8 @@ def _whole_lines(path: Path) -> list[dict]:
         raise DataError(f"{path} is damaged ({error}); {_ADVICE}") from error
 
 
-def _difference(old: dict, new: dict) -> str:
+def difference(old: dict, new: dict) -> str:
+    """The settings that are not what they were, for a message."""
     keys = [key for key in new if old.get(key) != new[key]]
     return (
         ", ".join(f"{key}: {old.get(key)!r} then, {new[key]!r} now" for key in keys)

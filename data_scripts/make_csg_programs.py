@@ -25,7 +25,7 @@ from tqdm import tqdm
 
 from data_scripts.csg_worker import Chunk, make_chunk
 from data_scripts.ending import exit_code
-from data_scripts.journal import code_digest, write_whole
+from data_scripts.journal import code_digest, difference, write_whole
 from data_scripts.parallel import in_parallel
 from lib.datasets import CSG_SIZES, CSG_SPLITS, DataError, data_root
 from lib.interpreters.csg import vocabulary_of
@@ -35,6 +35,10 @@ CHUNK = {
     3: 4096,
 }  # programs a worker makes at once, by dimension; fixed, because it decides what comes out
 _SPARE = 1.02  # as many more are made at first than are needed, for what turns out to be there already
+_OUT = (
+    "default: %(default)s; lib.datasets looks for a folder csg/ in data/, or in the folder that the environment "
+    "variable SHAPE_PROGRAMS_DATA names"
+)
 _EPILOG = """\
 on a cluster:
   pip install -e '.[cluster]', then --scheduler tcp://HOST:8786 of a running Dask cluster whose workers
@@ -89,20 +93,21 @@ class Parts:
 
 def make_all(options: argparse.Namespace, parts: Parts, wanted: dict[int, int]) -> dict[int, np.ndarray]:
     """As many different programs of each length as are wanted."""
-    size, dimensions = CHUNK[options.dimensions], options.dimensions
-    chunks = {length: _chunks(int(number * _SPARE), size) for length, number in wanted.items()}
+    dimensions = options.dimensions
+    first = {length: int(number * _SPARE) + 1 for length, number in wanted.items()}
+    size = {length: min(CHUNK[dimensions], number) for length, number in first.items()}
+    chunks = {length: _chunks(number, size[length]) for length, number in first.items()}
     programs: dict[int, np.ndarray] = {}
-    total = sum(chunks.values()) * size
-    with tqdm(desc="making", unit=" programs", total=total) as bar:
+    with tqdm(desc="making", unit=" programs") as bar:
         while len(programs) < len(wanted):
             needed = [(dimensions, length, k) for length, many in chunks.items() for k in range(many)]
             missing = [chunk for chunk in needed if not parts.path(chunk).exists()]
-            bar.update((len(needed) - len(missing)) * size - bar.n)
-            for chunk, tokens in _made(
-                options, sorted(missing, key=lambda chunk: -chunk[1])
-            ):  # the slow ones first
+            bar.total = sum(size[length] for _, length, _ in needed)
+            bar.update(bar.total - sum(size[length] for _, length, _ in missing) - bar.n)
+            missing.sort(key=lambda chunk: -chunk[1])  # the slow ones first
+            for chunk, tokens in _made(options, missing, size):
                 parts.keep(chunk, tokens)
-                bar.update(size)
+                bar.update(len(tokens))
             for length in wanted.keys() - programs.keys():
                 found = distinct(
                     np.concatenate([parts.read((dimensions, length, k)) for k in range(chunks[length])])
@@ -110,8 +115,7 @@ def make_all(options: argparse.Namespace, parts: Parts, wanted: dict[int, int]) 
                 if len(found) >= wanted[length]:
                     programs[length] = found[: wanted[length]]
                 else:
-                    chunks[length] += _chunks(wanted[length] - len(found), size)
-            bar.total = max(bar.total, sum(chunks.values()) * size)
+                    chunks[length] += _chunks(wanted[length] - len(found), size[length])
     return {length: programs[length] for length in wanted}
 
 
@@ -119,8 +123,10 @@ def _chunks(programs: int, size: int) -> int:
     return -(-programs // size)
 
 
-def _made(options: argparse.Namespace, missing: list[Chunk]) -> Iterator[tuple[Chunk, np.ndarray]]:
-    jobs = ((options.seed, chunk, CHUNK[options.dimensions]) for chunk in missing)
+def _made(
+    options: argparse.Namespace, missing: list[Chunk], size: dict[int, int]
+) -> Iterator[tuple[Chunk, np.ndarray]]:
+    jobs = ((options.seed, chunk, size[chunk[1]]) for chunk in missing)
     yield from in_parallel(make_chunk, jobs, options.workers, options.scheduler)
 
 
@@ -179,12 +185,15 @@ def run(options: argparse.Namespace) -> None:
     path, told = options.out / f"{name}.npz", options.out / f"{name}.json"
     settings = {"dimensions": options.dimensions, "seed": options.seed, "share": options.share}
     settings["code"] = code_digest("interpreters/csg")
-    if path.exists() and settings.items() <= _read(told).items():
+    before = _read(told) if path.exists() else {}
+    if settings.items() <= before.items():
         print(f"{path} is there already, made with the same settings: nothing to do")
-        shutil.rmtree(
-            options.out / f"{name}.parts", ignore_errors=True
-        )  # a run killed in the end may have left them
+        # A run that was killed at its very end may have left them.
+        shutil.rmtree(options.out / f"{name}.parts", ignore_errors=True)
         return
+    if before and not options.force:
+        changes = difference(before, settings)
+        raise DataError(f"{path} was made with other settings ({changes}); choose another --out, or --force")
     wanted = sizes(options.dimensions, options.share)
     parts = Parts(options.out / f"{name}.parts", settings)
     told.unlink(missing_ok=True)  # from here on the two files might not belong together
@@ -194,8 +203,9 @@ def run(options: argparse.Namespace) -> None:
     content = summary(arrays, settings)
     write_whole(told, (json.dumps(content, indent=2) + "\n").encode())
     shutil.rmtree(parts.folder)
+    took = f"{path.stat().st_size / 1e6:.3g} MB, {time.monotonic() - started:.0f} s"
     print(
-        f"{_told(content)}; {path.stat().st_size / 1e6:.1f} MB, {time.monotonic() - started:.0f} s, in {path}"
+        f"{_told(content)}; {took}, in {path}, where lib.datasets.csg_programs({options.dimensions}) reads it"
     )
 
 
@@ -226,7 +236,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--dimensions", type=int, choices=(2, 3), default=2, help="2: the plane (default), 3: space"
     )
-    parser.add_argument("--out", type=Path, default=data_root() / "csg", help="default: %(default)s")
+    parser.add_argument("--out", type=Path, default=data_root() / "csg", help=_OUT)
+    parser.add_argument("--force", action="store_true", help="replace programs made with other settings")
     parser.add_argument(
         "--seed", type=int, default=0, help="other seeds, other programs (default: %(default)s)"
     )

@@ -47,6 +47,10 @@ from lib.interpreters.rasterising import VIEWS, box_triangles, silhouettes
 from lib.interpreters.shapeassembly import ProgramError, execute_many
 
 CHUNK = 32  # shapes a worker takes at once; fixed, because a batch of programs is executed together
+OUT = (
+    "default: %(default)s; lib.datasets looks for a folder silhouettes/ in data/, or in the folder that the "
+    "environment variable SHAPE_PROGRAMS_DATA names"
+)
 MIT = "this project's own, MIT"
 CODE = (  # what, changed, draws other masks
     "lib/interpreters/cuboids.py",
@@ -181,6 +185,8 @@ def make_one(name: str, options: argparse.Namespace) -> str:
     path = options.out / f"{name}.npz"
     if mask_files.is_made(options.out, name, wanted):
         line = f"{path} is complete and up to date: nothing to do"
+    elif mask_files.replaces(options.out, name, wanted) and not options.force:
+        raise DataError(f"{path} was made of something else; choose another --out, or --force to replace it")
     else:
         total, items, facts = source.load()
         drawn = draw_all(name, source, total, items, options.workers)
@@ -211,7 +217,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--package", type=Path, help="use this .deb of sweethome3d-furniture, download nothing"
     )
-    parser.add_argument("--out", type=Path, default=data_root() / "silhouettes", help="default: %(default)s")
+    parser.add_argument("--out", type=Path, default=data_root() / "silhouettes", help=OUT)
+    parser.add_argument("--force", action="store_true", help="replace masks that were made of something else")
     parser.add_argument("--workers", type=int, default=-1, help="processes (default: one for each core)")
     parser.add_argument("--sheet", action="store_true", help="write contact sheets, too")
     options = parser.parse_args(arguments)

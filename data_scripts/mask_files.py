@@ -67,6 +67,15 @@ def is_made(folder: Path, source: str, settings: dict) -> bool:
     return whole and report.get("settings") == settings
 
 
+def replaces(folder: Path, source: str, settings: dict) -> bool:
+    """Would making these masks replace ones that were made of something else, such as more furniture?"""
+    try:
+        report = json.loads((folder / f"{source}.json").read_text(encoding="utf-8"))
+        return report["settings"]["made_of"] != settings["made_of"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
 def write(folder: Path, source: str, shapes: Iterable[Drawn], facts: dict) -> dict:
     """Write the .npz and .json of a source; returns what the latter says. `facts` go into it: settings, licence, …"""
     rows, masks, left_out = [], [], {}
@@ -89,6 +98,8 @@ def write(folder: Path, source: str, shapes: Iterable[Drawn], facts: dict) -> di
     content = _npz(images)
     report = {"source": source, "shapes": number, **_counts(images, left_out), **facts}
     report |= {"sha256": hashlib.sha256(content).hexdigest(), "left_out": left_out}
+    for sheet in folder.glob(f"{source}-*.png"):
+        sheet.unlink()  # it shows other masks
     write_whole(folder / f"{source}.npz", content)
     write_whole(folder / f"{source}.json", (json.dumps(report, indent=1, ensure_ascii=False) + "\n").encode())
     return report

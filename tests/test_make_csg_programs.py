@@ -252,10 +252,15 @@ def test_a_finished_run_is_not_done_again(tmp_path, quick, capsys):
 
 
 @pytest.mark.parametrize("change", [["--seed", "3"], ["--share", "0.0001"]], ids=lambda change: change[0])
-def test_other_settings_make_it_anew(tmp_path, quick, change):
-    assert run(tmp_path, *change) != run(tmp_path)
+def test_other_settings_replace_nothing_unless_told(tmp_path, quick, change, capsys):
+    made = run(tmp_path, *change)
+    assert make_csg_programs.main(options(tmp_path)) == 1
+    said = capsys.readouterr().err
+    assert "was made with other settings" in said and "choose another --out, or --force" in said
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == made
+    assert run(tmp_path, "--force") != made
     fresh = run(tmp_path / "fresh", *change)
-    run(tmp_path, *change)
+    run(tmp_path, *change, "--force")
     assert {path.name: path.read_bytes() for path in tmp_path.glob("*.*")} == fresh
 
 

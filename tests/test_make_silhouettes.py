@@ -123,6 +123,17 @@ def test_furniture_is_made_and_read_back(root, capsys):
     assert f"{told['masks']} masks of 60 shapes (" in capsys.readouterr().out
 
 
+def test_fewer_shapes_replace_more_only_when_told(root, capsys):
+    assert furniture(root, 3, "--sheet") == 0
+    path = root / "silhouettes" / "furniture.npz"
+    before = path.read_bytes()
+    assert furniture(root, 2) == 1
+    assert "was made of something else; choose another --out, or --force" in capsys.readouterr().err
+    assert path.read_bytes() == before and list(path.parent.glob("*.png"))
+    assert furniture(root, 2, "--force") == 0
+    assert path.read_bytes() != before and not list(path.parent.glob("*.png"))  # they showed other masks
+
+
 def test_the_embedded_masks_are_the_first_of_these(root, monkeypatch):
     monkeypatch.setattr(datasets.images, "EMBEDDED", 4)
     furniture(root, 4)
@@ -157,7 +168,7 @@ def test_again_does_nothing_unless_something_changed(root, capsys, monkeypatch):
     assert furniture(root) == 0 and contents(folder) == before  # repaired
     (folder / "furniture.json").write_text("{")
     assert furniture(root) == 0 and contents(folder) == before
-    assert furniture(root, 3) == 0 and report(root, "furniture")["shapes"] == 9
+    assert furniture(root, 3, "--force") == 0 and report(root, "furniture")["shapes"] == 9
     capsys.readouterr()
     monkeypatch.setattr(make_silhouettes, "CODE", ("lib/interpreters/rasterising.py",))
     assert furniture(root, 3) == 0 and "nothing to do" not in capsys.readouterr().out

@@ -14,9 +14,13 @@ from lib.interpreters.csg import (
     execute,
     execute_many,
     parse,
+    sample,
+    sample_many,
+    trace,
     vocabulary_of,
 )
 from lib.interpreters.csg.program import LONGEST
+from lib.interpreters.csg.tracing import parse_start
 
 A, B, BALL = Primitive("c", (32, 32, 28)), Primitive("s", (32, 32, 20)), Primitive("sp", (8, 8, 8, 8))
 MINUS = Operation("-")
@@ -143,12 +147,20 @@ MADE_WRONG = {
     "token -1": (lambda: Program.from_tokens([-1]), "token 0: '-1' is not a token; expected 0 to 399, where 399 is $"),
     "no whole token": (lambda: Program.from_tokens([0.0]), "token 0: '0.0' is not a token; expected 0 to 399"),
     "a batch of tokens": (lambda: Program.from_tokens(torch.zeros(1, 3).int()), "'[0, 0, 0]' is not a token"),
-    "tokens of space": (lambda: Program.from_tokens([0, 1, 6631]), "token 2: '6631' is not a token; expected 0 to 399"),
+    "tokens of space": (
+        lambda: Program.from_tokens([0, 1, 6631]),
+        "token 2: '6631' is not a token; expected 0 to 399, where 399 is $ (tokens of space: vocabulary_of(3))",
+    ),
+    "execute tokens of space": (
+        lambda: execute_many(torch.tensor([[0, 1, 6634]])),
+        "'6634' is not a token, in program 0; expected 0 to 399, where 399 is $ (tokens of space: dimensions=3)",
+    ),
     "tokens of no program": (lambda: Program.from_tokens([0, 0]), "token 2: the program ends with 2 shapes on the"),
     "only stops": (lambda: Program.from_tokens([399]), "token 0: the program is empty; expected a primitive"),
     "off the grid": (
         lambda: parse("c(33,32,8)").tokens(),
-        "token 0: 'c(33,32,8)' is not among the 400 tokens of the vocabulary; expected one such as c(16,16,12) or -",
+        "token 0: 'c(33,32,8)' is not among the 400 tokens of the vocabulary; expected one such as c(16,16,12) or -"
+        ": centers are 8, 16, … 56, sizes 8, 12, … 32, and nothing sticks out of the canvas",
     ),
     "no room": (
         lambda: parse("c(32,32,8)" * 2 + "+").tokens(length=2),
@@ -171,7 +183,26 @@ MADE_WRONG = {
     ),
     "execute a text": (
         lambda: execute("c(8,8,8)"),
-        "item 0 is a str; expected a Program, see parse(text), or all tokens",
+        "found a str; expected a Program, see parse(text)",
+    ),
+    "execute no program": (lambda: execute([RING]), "found a list; expected a Program, see parse(text)"),
+    "execute many of a text": (
+        lambda: execute_many("c(8,8,8)"),
+        "found a str; expected a sequence of Programs, see parse(text)",
+    ),
+    "execute many of one": (
+        lambda: execute_many(RING),
+        "found one Program; expected a sequence of them, or execute(program)",
+    ),
+    "trace a text": (
+        lambda: trace("c(8,8,8)"),
+        "found a str; expected a Program, see parse(text), or its statements",
+    ),
+    "a start that is no text": (lambda: parse_start(8), "the program is a int; expected a text"),
+    "a seed": (lambda: sample(0), "found 0; expected a numpy Generator, such as np.random.default_rng(0)"),
+    "a seed for many": (
+        lambda: sample_many(None, 1, 3),
+        "found None; expected a numpy Generator, such as np.random.default_rng(0)",
     ),
     "execute texts": (lambda: execute_many([RING, "c(8,8,8)"]), "item 1 is a str; expected a Program, see parse(text)"),
     "execute numpy": (
@@ -243,6 +274,15 @@ def test_an_error_says_which_token():
     assert (error.index, error.column, error.token) == (1, None, "-")
     error = error_of(execute_many, torch.tensor([[0, 0, 0], [0, 1000, 0]]))
     assert (error.index, error.column, error.token) == (1, None, "1000")
+
+
+def test_advice_is_given_only_where_it_is_true():
+    for message in (error_of(Vocabulary([A]).index, "/"), error_of(Vocabulary([A]).program, [400])):
+        assert "centers" not in str(message) and "space" not in str(message)
+    for token in (-1, 6635):  # not in space either
+        assert "space" not in str(error_of(execute_many, torch.tensor([[token]])))
+    assert "space" not in str(error_of(execute_many, torch.tensor([[6635]]), dimensions=3))
+    assert "centers are 8, 16, … 56" in str(error_of(parse("sp(8,8,8,9)").tokens))
 
 
 def test_there_are_two_dimensions():

@@ -244,9 +244,8 @@ def test_meshes_are_closed_and_as_large_as_their_voxels(unchecked_shapes):
         shape = execute(program)
         mesh = shape.mesh()
         assert mesh.is_empty or mesh.is_volume, program  # closed, faces outwards
-        if (
-            not mesh.is_empty and mesh.bounds.min() >= -0.5 and mesh.bounds.max() <= 63.5
-        ):  # nothing is cut off
+        # Where nothing is cut off:
+        if not mesh.is_empty and mesh.bounds.min() >= -0.5 and mesh.bounds.max() <= 63.5:
             deviations.append(abs(shape.on - mesh.volume) / mesh.area)
     # Voxels differ from the volume where the surface passes through them: each by half, if all erred the same way (and
     # thin slivers may do that); mostly they cancel. Measured on 486 programs: median 0.022, largest 0.29.

@@ -204,6 +204,11 @@ def test_any_primitives_make_a_vocabulary(programs):
 # The networks' vocabularies
 
 
+def test_a_vocabulary_says_what_it_is():
+    assert repr(vocabulary_of(2)) == "Vocabulary(2D: 396 primitives, then + * - $)"
+    assert repr(vocabulary_of(3)) == "Vocabulary(3D: 6631 primitives, then + * - $)"
+
+
 @pytest.mark.parametrize("dimensions, size", [(2, 400), (3, 6635)])
 def test_a_vocabulary_numbers_its_texts(dimensions, size, unchecked_shapes):
     vocabulary = vocabulary_of(dimensions)
@@ -256,15 +261,14 @@ def test_its_own_parameters_change_nothing(programs, unchecked_shapes):
 def test_parameters_come_in_text_order(programs):
     for program in programs:
         assert program.parameters().tolist() == [int(n) for n in re.findall(r"\d+", program.to_text())]
-    assert parse("c(1,2,3)s(4,5,6)-").parameter_names() == [
-        "0:c:x",
-        "0:c:y",
-        "0:c:r",
-        "1:s:x",
-        "1:s:y",
-        "1:s:r",
-    ]
-    assert parse("cy(1,2,3,4,5)").parameter_names() == ["0:cy:x", "0:cy:y", "0:cy:z", "0:cy:r", "0:cy:h"]
+    names = parse("c(1,2,3)s(4,5,6)-").parameter_names()
+    assert names == ("0:c:x", "0:c:y", "0:c:r", "1:s:x", "1:s:y", "1:s:r")
+    assert parse("cy(1,2,3,4,5)").parameter_names() == ("0:cy:x", "0:cy:y", "0:cy:z", "0:cy:r", "0:cy:h")
+
+
+def test_the_structure_is_what_is_not_a_number():
+    assert parse("c(1,2,3)s(4,5,6)-").structure == ("c", "s", "-") == parse("c(9,9,9)s(7,7,7)-").structure
+    assert parse("c(1,2,3)").structure == ("c",) != parse("s(1,2,3)").structure
 
 
 def test_other_parameters_change_the_numbers_only(programs, unchecked_shapes):
@@ -274,6 +278,7 @@ def test_other_parameters_change_the_numbers_only(programs, unchecked_shapes):
         other = program.with_parameters(numbers)
         assert other.parameters().tolist() == numbers.tolist()
         assert other.parameter_names() == program.parameter_names()
+        assert other.structure == program.structure
         assert re.sub(r"\d+", "", other.to_text()) == re.sub(r"\d+", "", program.to_text())
 
 

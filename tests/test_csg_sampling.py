@@ -109,9 +109,8 @@ def test_primitives_are_inside_the_canvas(sampled, dimensions):
         axes = center[:2] if primitive.kind == "cy" else center
         # The lowest and the highest line of pixels are 0 and 63; spheres and cylinders may touch the plane beyond.
         reached = [k + size * low for k in axes], [k + size * high for k in axes]
-        if (
-            primitive.kind == "t"
-        ):  # an upright triangle's base is half as far below the center as its tip above
+        # An upright triangle's base is half as far below the center as its tip above.
+        if primitive.kind == "t":
             (x, y), half = center, 0.866 * size
             reached = [x - half, y - size], [x + half, y + size / 2]
         assert min(reached[0]) > -1 and max(reached[1]) <= SIDE, primitive

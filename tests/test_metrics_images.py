@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from lib.interpreters.csg import execute, parse
 from lib.metrics.distances import DIAGONAL, STRAIGHT, distance_transform
 from lib.metrics.edges import edge_map
 from lib.metrics.images import BLANK_PX, image_chamfer, iou, reward
@@ -122,6 +123,11 @@ def test_the_reward_falls_with_the_distance():
     assert reward(torch.tensor([-1.0, 100])).tolist() == [1, 0]
 
 
+def test_the_reward_of_one_number():
+    found = reward(4.0)
+    assert found.shape == () and torch.equal(found, reward(torch.tensor(4.0))) and reward(0) == 1
+
+
 # --- edges
 
 
@@ -222,9 +228,8 @@ def test_a_shifted_square(by):
     a, b = square(20, 20, 24), square(20, 20 + by, 24)
     found = float(image_chamfer(a, b, "euclidean"))
     assert found == pytest.approx(mean_both_ways(a, b), abs=ROUNDING)
-    assert (
-        by / 2 < found < by / 2 + 0.25 * by
-    )  # half of the outline moved by all of it, ends of the other half a bit
+    # Half of the outline moved by all of it, ends of the other half a bit.
+    assert by / 2 < found < by / 2 + 0.25 * by
 
 
 def test_the_euclidean_form_is_the_papers_formula():
@@ -248,17 +253,15 @@ def test_a_blank_image_is_16_px_from_everything(distance):
     a = torch.stack([blank, full, blank, blank, shape, shape])
     b = torch.stack([shape, shape, full, blank, blank, shape])
     assert image_chamfer(a, b, distance).tolist() == [BLANK_PX] * 5 + [0]
-    assert reward(image_chamfer(a, b, distance))[0] == pytest.approx(
-        0.0204, abs=5e-5
-    )  # as the authors round it
+    # As the authors round it:
+    assert reward(image_chamfer(a, b, distance))[0] == pytest.approx(0.0204, abs=5e-5)
 
 
 def test_chamfer_and_reward_are_the_authors(pairs):
     found = image_chamfer(pairs["a"], pairs["b"])
     assert torch.allclose(found.double(), pairs["chamfer"], atol=ROUNDING, rtol=0)
-    assert torch.allclose(
-        reward(found).double(), pairs["reward"], atol=1e-5, rtol=0
-    )  # 20 / 90 of that at most
+    # 20 / 90 of that at most:
+    assert torch.allclose(reward(found).double(), pairs["reward"], atol=1e-5, rtol=0)
 
 
 def test_the_authors_form_is_close_to_the_papers(pairs):
@@ -286,6 +289,7 @@ def test_iou_of_voxels():
     a[0, :2], b[0, 1:3] = True, True
     assert iou(a, b, dims=3).tolist() == pytest.approx([1 / 3, 1])
     assert iou(a, b, dims=4) == pytest.approx(1 / 3)
+    assert iou(a[0], b[0]).shape == image_chamfer(a[0], b[0]).shape == (4,)  # a batch of images, unless told
 
 
 # --- errors
@@ -304,6 +308,25 @@ def test_two_images_have_to_fit(function, images, unchecked_shapes):
         function(images, images.float())
     with pytest.raises(ValueError, match=r"a has to be images .* got \(8,\)"):
         function(images[0], images[0])
+
+
+@pytest.mark.parametrize("function", [iou, image_chamfer])
+@pytest.mark.parametrize(
+    "text, kind, how", [("c(8,8,8)", "Picture", "shape.image"), ("sp(8,8,8,8)", "Solid", "shape.grid")]
+)
+def test_shapes_are_asked_for_their_pixels(function, text, kind, how, unchecked_shapes):
+    shape = execute(parse(text))
+    expected = rf"a: found a {kind}; expected a bool tensor \(…, h, w\), such as {how}"
+    with pytest.raises(ValueError, match=expected):
+        function(shape, shape)
+
+
+@pytest.mark.parametrize("function", [edge_map, distance_transform, lambda image: iou(image, image)])
+def test_arrays_are_to_become_tensors(function, images, unchecked_shapes):
+    with pytest.raises(ValueError, match=r"found a ndarray; expected a bool tensor .* torch.as_tensor\("):
+        function(images.numpy())
+    with pytest.raises(ValueError, match="found a list; expected a bool tensor"):
+        function(images.tolist())
 
 
 @pytest.mark.parametrize("function, name", [(edge_map, "images"), (distance_transform, "edges")])

@@ -1,5 +1,7 @@
 """Figures of CSG programs say what is there; the trace obeys its laws; the playground works without a browser."""
 
+import re
+
 import numpy as np
 import pytest
 import torch
@@ -142,6 +144,21 @@ def test_what_makes_no_picture_is_named(given, problem):
         image_of(given)
 
 
+@pytest.mark.parametrize("show", [show_tree, show_stack, show_pictures, show_primitives, image_of])
+def test_programs_of_space_are_sent_to_show_solids(show):
+    for given in (CUP, parse(CUP)):
+        with pytest.raises(TypeError, match="found a Program in space; .*show_solids of lib.viewing.voxels"):
+            show(given)
+
+
+def test_shapes_of_space_are_sent_to_show_solids():
+    for given, found in ((execute(parse(CUP)), "a Solid"), (execute_many([parse(CUP)]), "Shapes")):
+        with pytest.raises(TypeError, match=f"found {found} in space; .*show_solids"):
+            show_pictures(given)
+    with pytest.raises(TypeError, match="found a Primitive in space; .*show_solids"):
+        show_stack(parse(CUP).statements)
+
+
 def test_a_sheet_has_every_picture_pixel_for_pixel():
     figure = show_pictures([RING, HOUSE], ["ring", "house"], scale=1)
     assert stamps(figure) == 2 and [text.get_text() for text in figure.axes[0].texts] == ["ring", "house"]
@@ -193,10 +210,19 @@ def test_primitives_are_outlined_in_the_colours_of_their_kinds():
     assert all(has_color(figure, color) for color in COLORS.values())
     dashed = [patch for patch in figure.axes[0].patches if patch.get_linestyle() not in ("-", "solid")]
     assert len(dashed) == 2
-    twice = show_primitives(
-        "c(32,32,28)c(32,32,20)c(32,32,8)--"
-    )  # cut away from what is cut away: it is there
+    # Cut away from what is cut away: it is there.
+    twice = show_primitives("c(32,32,28)c(32,32,20)c(32,32,8)--")
     assert sum(patch.get_linestyle() not in ("-", "solid") for patch in twice.axes[0].patches) == 1
+
+
+@pytest.mark.parametrize("title", ["", "one", "one\ntwo", "one\ntwo\nthree"])
+def test_titles_and_the_legend_have_room(title):
+    figure = show_primitives([HOUSE, RING], [title, "short"] if title else None)
+    FigureCanvasAgg(figure).draw()
+    legend = figure.axes[0].get_legend().get_window_extent()
+    assert legend.y0 >= 0
+    for text in figure.axes[0].texts:
+        assert not text.get_text() or text.get_window_extent().y0 >= legend.y1 - 1  # dots
 
 
 # The program as it runs
@@ -235,18 +261,16 @@ def test_the_tree_has_a_picture_for_every_token(text):
 def test_voxels_make_a_watertight_mesh_of_their_own_volume():
     shape, mesh = execute(parse(CUP)), voxel_mesh(CUP)
     assert mesh.is_watertight and mesh.volume == pytest.approx(shape.on)
-    assert np.allclose(
-        mesh.bounds, [[16.5, 16.5, -47.5], [47.5, 47.5, -16.5]]
-    )  # 31 voxels from 17 to 47, z up
+    # 31 voxels from 17 to 47, z up:
+    assert np.allclose(mesh.bounds, [[16.5, 16.5, -47.5], [47.5, 47.5, -16.5]])
 
 
 def test_up_is_up_and_the_exact_surface_lies_on_the_voxels():
     post = "cy(16,24,40,4,16)"
     for mesh in (voxel_mesh(post), exact_mesh(post)):
         assert mesh.bounds.mean(axis=0) == pytest.approx([16, 40, -24], abs=0.6)  # x, z up, y to the back
-    assert exact_mesh(CUP).volume == pytest.approx(
-        voxel_mesh(CUP).volume, rel=0.05
-    )  # 5%: the rim of the bowl
+    # 5%: the rim of the bowl.
+    assert exact_mesh(CUP).volume == pytest.approx(voxel_mesh(CUP).volume, rel=0.05)
 
 
 def test_solids_stand_side_by_side():
@@ -312,17 +336,21 @@ def test_the_grid_says_where_the_networks_have_no_word(playground):
     [
         ("+", "'+' combines two shapes, the stack holds 1 shape"),
         ("c(8,8,32)", "the circle would stick out of the canvas"),
-        ("c(10,8,8)", "their centers are 8, 16, … 56"),
+        ("c(10,8,8)", "networks: centers are 8, 16, … 56, sizes 8, 12, … 32"),
         ("c(99,8,8)", "off the canvas"),
         ("sp(32,32,32,8)", "it is in space"),
         ("c(32,32,8)c(32,32,8)", "2 tokens in"),
-        ("$", "0 tokens in"),
+        (
+            "$",
+            "'$' ends what a network writes; here a program ends with its last token; expected a primitive",
+        ),
+        ("", "0 tokens in"),
         ("q", "is no token"),
     ],
 )
 def test_what_cannot_be_pushed_is_refused_with_the_reason(token, reason):
     playground = Playground("c(32,32,28)")
-    with pytest.raises(ProgramError, match=reason.replace("(", r"\(").replace("+", r"\+")):
+    with pytest.raises(ProgramError, match=re.escape(reason)):
         playground.push(token)
     click(playground, "push", token)
     assert reason in playground.view["error"]["message"] and playground.text == "c(32,32,28)"
@@ -389,6 +417,14 @@ def test_texts_may_have_any_numbers_but_only_in_the_plane(playground):
     for make in (playground.load, Playground):
         with pytest.raises(ProgramError, match="in space"):
             make(CUP)
+
+
+def test_it_may_start_from_a_program(playground):
+    assert Playground(parse(RING)).text == RING
+    playground.load(parse(RING))
+    assert playground.program == parse(RING)
+    with pytest.raises(ProgramError, match="in space"):
+        Playground(parse(CUP))
 
 
 def test_a_target_is_compared_with_the_top_of_the_stack():

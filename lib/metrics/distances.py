@@ -64,9 +64,8 @@ def _within_columns(edges: Bool[Tensor, "n h w"]) -> Shaped[Tensor, "n h w"]:
     Looks 1, 2, 4, … pixels up and down: every distance is a sum of these.
     """
     side = max(edges.shape[1:])
-    far = (
-        2 * side
-    )  # longer than the diagonal by either measure: never the nearest, if there is an edge at all
+    # Longer than the diagonal by either measure: never the nearest, if there is an edge at all.
+    far = 2 * side
     kinds = (torch.uint8, torch.int16, torch.int32)
     kind = next(kind for kind in kinds if far + side <= torch.iinfo(kind).max)  # small numbers are quick
     nearest = (~edges).to(kind).mul_(far)

@@ -41,6 +41,8 @@ def edge_map(images: Bool[Tensor, "*batch h w"]) -> Bool[Tensor, "*batch h w"]:
 def check_images(**images: Tensor) -> None:
     """Raises ValueError, with the argument's name, unless these are bool images (..., h, w), all of one shape."""
     for name, image in images.items():
+        if not isinstance(image, Tensor):
+            raise ValueError(f"{name}: {_no_tensor(name, image)}")
         if image.dtype != torch.bool:
             raise ValueError(f"{name} has to be bool, got {image.dtype}; `{name} > 0.5` makes it so")
         if image.ndim < 2 or not prod(image.shape[-2:]):
@@ -51,6 +53,14 @@ def check_images(**images: Tensor) -> None:
     if len({*shapes.values()}) > 1:
         found = " and ".join(f"{name} {shape}" for name, shape in shapes.items())
         raise ValueError(f"images have to have one shape, got {found}; `expand_as` repeats an image")
+
+
+def _no_tensor(name: str, thing) -> str:
+    """What was found instead of a tensor, and how to make one of it."""
+    how = "shape.grid" if hasattr(type(thing), "grid") else "shape.image"
+    if hasattr(thing, "__array__"):
+        how = f"torch.as_tensor({name})"
+    return f"found a {type(thing).__name__}; expected a bool tensor (…, h, w), such as {how}"
 
 
 def in_parts(batch: Tensor, cells: int) -> tuple[Tensor, ...]:

@@ -19,9 +19,10 @@ IMAGE_DIAGONAL = 64 * 2**0.5  # px, of their images
 def iou(a: Bool[Tensor, "*shape"], b: Bool[Tensor, "*shape"], dims: int = 2) -> Float[Tensor, "..."]:
     """Intersection over union, |A and B| / |A or B|: 0 for disjoint shapes, 1 for equal ones, two empty ones included.
 
-    dims    how many trailing dimensions are one shape: 2 for images, 3 for voxels; those before are a batch
+    dims    how many trailing dimensions are one shape: 2 for images, 3 for voxels; those before are a batch.
+            So for voxels give dims=3: without it, two grids (64, 64, 64) are 64 pairs of images.
     (The CSGNet authors' program for voxels divides by |A or B| + 1.)
-    Raises ValueError unless both are bool, of one shape, with at least `dims` dimensions.
+    Raises ValueError unless both are bool tensors of one shape, with at least `dims` dimensions.
     """
     check_images(a=a, b=b)
     if not (2 <= dims <= a.ndim and prod(a.shape[-dims:])):
@@ -46,8 +47,8 @@ def image_chamfer(
                 adds 1 to 255 times the number of edge pixels before it divides by that.
                 "euclidean": what the paper's formula says, exactly. The two differ by less than 5 %.
     If a or b has no edges, because it is all False or all True, either form gives the authors' 16 px, even for two
-    equal images. No gradient. Raises ValueError for an unknown distance, and unless a and b are bool images of one
-    shape.
+    equal images. No gradient. For images only: two grids of voxels (64, 64, 64) are 64 pairs of images, one distance
+    each. Raises ValueError for an unknown distance, and unless a and b are bool tensors of one shape.
     """
     check_images(a=a, b=b)
     parts = (in_parts(x.reshape(-1, *x.shape[-2:]), PIXELS_AT_ONCE // 2) for x in (a, b))
@@ -66,14 +67,15 @@ def _chamfer(a: Bool[Tensor, "n h w"], b: Bool[Tensor, "n h w"], distance: str) 
 
 
 def reward(
-    distance_px: Float[Tensor, "*batch"], power: float = 20, diagonal: float = IMAGE_DIAGONAL
+    distance_px: Float[Tensor, "*batch"] | float, power: float = 20, diagonal: float = IMAGE_DIAGONAL
 ) -> Float[Tensor, "*batch"]:
     """What a program earns whose image lies `distance_px` from the target: (1 - distance / diagonal) ** power.
 
+    distance_px a tensor, or one number, which gives a tensor () too
     diagonal    of the images, px. Beyond it the reward is 0; at distance 0 it is 1.
     A blank image, 16 px from everything, earns 0.02, and so does an invalid program in the authors' code; by the
     paper an invalid program earns 0. Raises ValueError for a power or diagonal that is not positive.
     """
     if not (power > 0 and diagonal > 0):
         raise ValueError(f"power and diagonal have to be positive, got {power} and {diagonal}")
-    return (1 - distance_px / diagonal).clamp(0, 1) ** power
+    return (1 - torch.as_tensor(distance_px) / diagonal).clamp(0, 1) ** power

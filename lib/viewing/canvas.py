@@ -30,6 +30,7 @@ def image_of(picture) -> np.ndarray:
     """image[y, x] of whatever makes a picture. Raises TypeError or ValueError for what is none."""
     if isinstance(picture, str):
         picture = parse(picture)
+    refuse_space(picture)
     if isinstance(picture, Program):
         picture = execute(picture)
     if isinstance(picture, Picture):
@@ -44,6 +45,14 @@ def image_of(picture) -> np.ndarray:
             f"found an array {picture.shape} of {picture.dtype}; expected image[y, x] of booleans"
         )
     return picture.astype(bool)
+
+
+def refuse_space(thing) -> None:
+    """Raises TypeError for a program, a shape or shapes of space."""
+    if getattr(thing, "dimensions", 2) == 3:
+        found = "Shapes" if isinstance(thing, Shapes) else f"a {type(thing).__name__}"
+        expected = "an image or a program of the plane; show_solids of lib.viewing.voxels draws space"
+        raise TypeError(f"found {found} in space; expected {expected}")
 
 
 def page(width: int, height: int, scale: float) -> tuple[Figure, Axes]:
@@ -68,9 +77,7 @@ def stamp(
     height, width = image.shape
     _paste(ax, np.where(image[..., None], to_rgba(color), to_rgba(PAPER)), x, y)
     if dots_of(ax) > 1.2:
-        lines = (
-            np.arange(8, min(height, width), 8) + 0.5
-        )  # pixel k has its center at k, and k + 0.5 on the page
+        lines = np.arange(8, min(height, width), 8) + 0.5  # pixel k has its center at k + 0.5 on the page
         style = {"color": RIM, "alpha": 0.28, "linewidth": 0.6, "zorder": 1.1}
         ax.vlines(x + lines[lines < width], y, y + height, **style)
         ax.hlines(y + lines[lines < height], x, x + width, **style)
@@ -108,7 +115,8 @@ def show_pictures(
 
     titles   one under each.      columns  6 when left out, or 10 from 25 pictures on.
     scale    dots a pixel: when left out, as large as a notebook is wide, 4 at most.
-    Raises ValueError when the titles are not as many as the pictures. A blank picture with a cross was no program.
+    Raises ValueError when the titles are not as many as the pictures, and TypeError for pictures of space. A blank
+    picture with a cross was no program.
     """
     images, valid = _images(pictures)
     titles = [""] * len(images) if titles is None else list(titles)
@@ -131,7 +139,8 @@ def show_pictures(
 
 
 def _images(pictures) -> tuple[list[np.ndarray], Sequence[bool]]:
-    """Images, and which of them are of programs that are valid."""
+    """Images, and which of them are of programs that are valid. Raises TypeError for what is no picture."""
+    refuse_space(pictures)
     if isinstance(pictures, Shapes):
         return list(pictures.images.cpu().numpy()), pictures.valid.tolist()
     many = isinstance(pictures, (list, tuple)) or getattr(pictures, "ndim", 2) == 3
@@ -196,7 +205,9 @@ def show_primitives(programs, titles: Sequence[str] | None = None, *, scale: flo
         raise ValueError(f"{len(titles)} titles for {len(programs)} programs: one each, please")
     cell = SIDE + GAP
     scale = scale or fitting_scale(len(programs) * cell, largest=6)
-    figure, ax = page(len(programs) * cell, cell + round((24 + 18 * any(titles)) / scale), scale)
+    lines = max((title.count("\n") + bool(title) for title in titles), default=0)
+    below = round(14.4 * lines) + 4 * (lines > 0)  # dots that titles take
+    figure, ax = page(len(programs) * cell, cell + round((24 + below) / scale), scale)
     for place, (program, title) in enumerate(zip(programs, titles)):
         x, y = place * cell + GAP // 2, GAP // 2
         stamp(ax, image_of(program), x, y, "#d3d9e2")
@@ -209,7 +220,7 @@ def show_primitives(programs, titles: Sequence[str] | None = None, *, scale: flo
     keys = [Line2D([], [], color=COLORS[kind], label=KINDS[kind].name) for kind in kinds]
     if any(cut for program in programs for _, cut in _signed(program)):
         keys.append(Line2D([], [], color=SOFT, linestyle=(0, (3, 2)), label="cut away"))
-    _legend(ax, keys, len(programs) * cell / 2, cell + (18 * any(titles) - 4) / scale)
+    _legend(ax, keys, len(programs) * cell / 2, cell + (below - 4) / scale)
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Figures of numbers on pixels: how far each pixel of a picture is from an outline."""
+"""Figures of numbers: how far each pixel of a picture is from an outline, and a curve through a few points."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ def show_distances(
 ) -> Figure:
     """Maps of distances side by side in one scale, (h, w) px [row y, column x]; light is near, dark is far.
 
-    Small maps show their numbers, rounded to one decimal; large ones a line every 8 px.
+    Small maps show their numbers, rounded to one decimal; large ones a line every 8 px, marked with its distance.
     marks   pixels to mark in red, one bool (h, w) a map.    size   of one map, inches.
     """
     if len(titles) != len(maps) or (marks is not None and len(marks) != len(maps)):
@@ -37,7 +37,8 @@ def show_distances(
             for (y, x), distance in np.ndenumerate(grid):
                 ax.text(x, y, f"{distance:.1f}", ha="center", va="center", fontsize=7.5)
         elif farthest > RINGS:
-            ax.contour(grid, np.arange(RINGS, farthest, RINGS), colors="#24344d", linewidths=0.8)
+            lines = ax.contour(grid, np.arange(RINGS, farthest, RINGS), colors="#24344d", linewidths=0.8)
+            ax.clabel(lines, fmt="%g", fontsize=6.5)
         ax.set(xticks=[], yticks=[])
         ax.set_xlabel(title, fontsize=9)
     for ax, mark in zip(axes[0], [] if marks is None else marks):
@@ -46,5 +47,25 @@ def show_distances(
         for y, x in np.argwhere(np.asarray(mark)):
             place = (x - side / 2, y - side / 2)
             ax.add_patch(Rectangle(place, side, side, fill=large, color=MARK, linewidth=0 if large else 1.4))
+    figure.tight_layout()
+    return figure
+
+
+def show_points(
+    places: Sequence[int], heights: Sequence[float], xlabel: str, ylabel: str, title: str
+) -> Figure:
+    """A curve that is known at a few places only: a marker, a tick and the number (two digits) at each."""
+    if len(places) != len(heights):
+        raise ValueError(f"{len(heights)} heights for {len(places)} places: one each, please")
+    figure, ax = plt.subplots(figsize=(5.2, 2.8), dpi=100)
+    plt.close(figure)
+    ax.plot(places, heights, marker="o", color="#5e8bba", linewidth=1.6)
+    for place, height in zip(places, heights):
+        above = {"xytext": (4, 5), "textcoords": "offset points", "fontsize": 8}
+        ax.annotate(f"{height:.2g}", (place, height), **above)
+    ax.set(xticks=places, xlabel=xlabel, ylabel=ylabel, title=title)
+    ax.set_ylim(0, 1.15 * max(heights))
+    ax.margins(x=0.08)
+    ax.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
     return figure

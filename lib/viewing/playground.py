@@ -27,9 +27,9 @@ from lib.interpreters.csg import (
     vocabulary_of,
 )  # fmt: skip
 from lib.interpreters.csg.primitives import draw
-from lib.interpreters.csg.program import Operation, Statement
+from lib.interpreters.csg.program import STOP, Operation, Statement
 from lib.interpreters.csg.tracing import missing, parse_start
-from lib.interpreters.csg.vocabulary import CENTERS, SIZES
+from lib.interpreters.csg.vocabulary import CENTERS, SIZES, WORDS
 from lib.interpreters.quoting import quoted
 from lib.viewing.canvas import image_of, overlap
 from lib.viewing.running import MEANING, show_stack
@@ -42,6 +42,7 @@ ACTIONS = ("push", "undo", "redo", "clear", "load", "look")  # what the browser 
 class Playground(anywidget.AnyWidget):
     """A program of the plane under construction; its stack, and the picture on top of it.
 
+    It starts from a text, half written or whole, or from a Program.
     text     what is written so far.       program  that as a Program, or None while it is half written.
     tokens   its tokens, as texts.         stack    the pictures on the stack, bottom first.
     iou      of the top with the target, or None.
@@ -52,22 +53,19 @@ class Playground(anywidget.AnyWidget):
     _css = JS / "playground.css"
     kind = traitlets.Enum(("c", "s", "t"), "c").tag(sync=True)  # of the primitive that a click adds
     size = traitlets.Enum(tuple(SIZES), 16).tag(sync=True)
-    view = traitlets.Dict().tag(
-        sync=True
-    )  # what the page says: tokens, messages, which buttons work and why not
+    # What the page says: tokens, messages, which buttons work and why not.
+    view = traitlets.Dict().tag(sync=True)
     pictures = traitlets.Bytes(b"").tag(sync=True)  # the stack in view, top first, 512 bytes each
-    stencils = traitlets.Bytes(b"").tag(
-        sync=True
-    )  # the primitive at each of the 7 x 7 centers, 512 bytes each
-    refused = traitlets.List().tag(
-        sync=True
-    )  # for each center why the primitive cannot stand there; "" where it can
+    # The primitive at each of the 7 x 7 centers, 512 bytes each.
+    stencils = traitlets.Bytes(b"").tag(sync=True)
+    # For each center why the primitive cannot stand there; "" where it can.
+    refused = traitlets.List().tag(sync=True)
     goal = traitlets.Bytes(b"").tag(sync=True)
 
-    def __init__(self, text: str = "", target=None, **options):
+    def __init__(self, text: str | Program = "", target=None, **options):
         self._past: list[tuple[Statement, ...]] = []
         self._future: list[tuple[Statement, ...]] = []
-        self._statements = _in_the_plane(parse_start(text))
+        self._statements = _in_the_plane(_written(text))
         self._steps = trace(self._statements)
         self._target = None if target is None else image_of(target)
         super().__init__(goal=b"" if target is None else _packed(self._target), **options)
@@ -103,6 +101,9 @@ class Playground(anywidget.AnyWidget):
 
     def push(self, token: str) -> None:
         """Add a token: one of the networks' primitives such as "c(32,32,8)", or + * -. Else raises ProgramError."""
+        if token == STOP:
+            found = f"'{STOP}' ends what a network writes; here a program ends with its last token"
+            raise ProgramError(found, expected="a primitive such as c(32,32,8), or + * -")
         statements = parse_start(token) if token not in OPERATIONS else (Operation(token),)
         if len(statements) != 1:
             raise ProgramError(f"{len(statements)} tokens in {quoted(token)}", expected="one")
@@ -111,9 +112,9 @@ class Playground(anywidget.AnyWidget):
             raise ProgramError(reason)
         self._become(self._statements + statements)
 
-    def load(self, text: str) -> None:
+    def load(self, text: str | Program) -> None:
         """Replace the program, also by a half-written one. Raises ProgramError for what cannot begin a program."""
-        self._become(_in_the_plane(parse_start(text)))
+        self._become(_in_the_plane(_written(text)))
 
     def clear(self) -> None:
         """Start anew; `undo` brings the program back."""
@@ -212,6 +213,11 @@ class Playground(anywidget.AnyWidget):
             self._show(self._shown, error, arguments[0] if action == "load" else None)
 
 
+def _written(text: str | Program) -> tuple[Statement, ...]:
+    """The statements of a Program, or of a text that may be half written. Raises ProgramError for what begins none."""
+    return text.statements if isinstance(text, Program) else parse_start(text)
+
+
 def _misfit(primitive: Primitive) -> str:
     """Why a primitive is not in the vocabulary of the plane."""
     if primitive.dimensions != 2:
@@ -219,8 +225,7 @@ def _misfit(primitive: Primitive) -> str:
     x, y, size = primitive.numbers
     if x in CENTERS and y in CENTERS and size in SIZES:
         return f"the {KINDS[primitive.kind].name} would stick out of the canvas"
-    centers, sizes = (f"{numbers[0]}, {numbers[1]}, … {numbers[-1]}" for numbers in (CENTERS, SIZES))
-    return f"their centers are {centers}, their sizes {sizes}"
+    return WORDS
 
 
 def _count(statements: tuple[Statement, ...]) -> str:

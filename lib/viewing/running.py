@@ -13,7 +13,19 @@ from matplotlib.patheffects import withStroke
 from lib.interpreters.csg import Operation, Program, Shape, Step, parse, trace
 from lib.interpreters.csg.packing import SIDE
 from lib.interpreters.csg.program import Statement
-from lib.viewing.canvas import COLOR_A, COLOR_B, GAP, INK, RIM, SOFT, fitting_scale, page, stamp, write
+from lib.viewing.canvas import (
+    COLOR_A,
+    COLOR_B,
+    GAP,
+    INK,
+    RIM,
+    SOFT,
+    fitting_scale,
+    page,
+    refuse_space,
+    stamp,
+    write,
+)
 
 MEANING = {"+": "A or B", "*": "A and B", "-": "A without B"}
 _AISLE = 20  # pixels between two columns of the strip, where the arrows run
@@ -23,8 +35,9 @@ def show_stack(program: Program | str | Sequence[Statement], *, columns: int = 9
     """The stack after each token, its top above; what the next operation takes is coloured, blue A and orange B.
 
     A program, its text, or the statements of a half-written one. `columns` tokens stand in a row of the figure.
+    Raises TypeError for a program of space.
     """
-    steps = trace(parse(program) if isinstance(program, str) else program)
+    steps = _steps(program)
     columns = max(1, min(columns, len(steps)))
     rows = [range(first, min(first + columns, len(steps))) for first in range(0, len(steps), columns)]
     cell = SIDE + _AISLE
@@ -40,6 +53,16 @@ def show_stack(program: Program | str | Sequence[Statement], *, columns: int = 9
             _column(ax, steps, place, (place - row.start) * cell + _AISLE / 2, floor, place > row.start)
         floor += below
     return figure
+
+
+def _steps(program: Program | str | Sequence[Statement]) -> list[Step]:
+    """The trace of a program of the plane. Raises TypeError for one of space."""
+    program = parse(program) if isinstance(program, str) else program
+    refuse_space(program)
+    steps = trace(program)
+    if steps:
+        refuse_space(steps[0].token)
+    return steps
 
 
 def _column(ax: Axes, steps: list[Step], place: int, x: float, floor: float, follows: bool) -> None:
@@ -75,9 +98,11 @@ def _arrow(ax: Axes, start: tuple, end: tuple, color: str) -> None:
 
 
 def show_tree(program: Program | str, *, scale: float | None = None) -> Figure:
-    """The tree of operations with the picture of every node; blue lines lead to A, orange ones to B."""
-    program = parse(program) if isinstance(program, str) else program
-    steps = trace(program)
+    """The tree of operations with the picture of every node; blue lines lead to A, orange ones to B.
+
+    Raises TypeError for a program of space.
+    """
+    steps = _steps(program)
     places, parents = _places(steps)
     leaves, levels = (1 + max(place[k] for place in places) for k in (0, 1))
     wide, high = SIDE + GAP + 8, SIDE + 36

@@ -19,8 +19,9 @@ def compare_bars(
     """
     sources = list(rows)
     categories = list(rows[sources[0]])
+    wide = max(3.1, 0.34 * len(sources) * len(categories))  # inches; each bar has room for its number
     figure, axes = plt.subplots(
-        1, len(quantities), figsize=(3.1 * len(quantities), 2.8), dpi=100, squeeze=False
+        1, len(quantities), figsize=(wide * len(quantities), 2.8), dpi=100, squeeze=False
     )
     plt.close(figure)
     width = 0.8 / len(sources)

@@ -9,13 +9,18 @@ from torch import Tensor
 from ..quoting import quoted
 from .errors import ProgramError
 from .machine import run
-from .program import LONGEST, STOP, Primitive, Program
+from .program import LONGEST, Primitive, Program
 from .shape import Shape, Shapes
 from .vocabulary import Vocabulary, vocabulary_of
 
 
 def execute(program: Program) -> Shape:
-    """The shape of one program: a picture in the plane, a grid of voxels in space."""
+    """The shape of one program: a picture in the plane, a grid of voxels in space.
+
+    Raises ProgramError for what is no Program.
+    """
+    if not isinstance(program, Program):
+        raise ProgramError(f"found a {type(program).__name__}", expected="a Program, see parse(text)")
     return execute_many([program])[0]
 
 
@@ -32,10 +37,14 @@ def execute_many(
     vocabulary  what the tokens mean: that of the plane, or of `dimensions` (2 or 3), if left out. Programs may have
                 primitives of no vocabulary, so they do not need one.
     device      where to compute: that of the tokens, if left out.
-    Raises ProgramError for Programs of both dimensions, and for numbers that are no tokens.
+    Raises ProgramError for what are no Programs, for Programs of both dimensions, and for numbers that are no tokens.
     """
     if dimensions not in (None, 2, 3):
         raise ValueError(f"found {dimensions} dimensions; expected 2 or 3")
+    if isinstance(programs, Program):
+        raise ProgramError("found one Program", expected="a sequence of them, or execute(program)")
+    if isinstance(programs, str):
+        raise ProgramError("found a str", expected="a sequence of Programs, see parse(text)")
     if isinstance(programs, Tensor):
         vocabulary = vocabulary or vocabulary_of(dimensions or 2)
         tokens = _checked(programs, vocabulary)
@@ -60,9 +69,9 @@ def _checked(tokens: Tensor, vocabulary: Vocabulary) -> Int[Tensor, "programs le
     if not tokens.numel() or (tokens.min() >= 0 and tokens.max() <= vocabulary.stop):
         return tokens
     row, place = ((tokens < 0) | (tokens > vocabulary.stop)).nonzero()[0].tolist()
-    token = str(tokens[row, place].item())
-    expected = f"0 to {vocabulary.stop}, where {vocabulary.stop} is {STOP}"
-    raise ProgramError(f"{quoted(token)} is not a token, in program {row}", place, token, expected)
+    token = int(tokens[row, place])
+    expected = vocabulary.expected_for(token, "dimensions=3")
+    raise ProgramError(f"'{token}' is not a token, in program {row}", place, str(token), expected)
 
 
 def _without_padding(tokens: Tensor, stop: int) -> Int[Tensor, "programs shorter"]:

@@ -98,9 +98,8 @@ def _split_chances(operations: int) -> np.ndarray:
 def _draw(rng: np.random.Generator, number: int, vocabulary: Vocabulary) -> _Parts:
     """Random primitives: the kind first, then one of its members."""
     kinds = [primitive.kind for primitive in vocabulary.primitives]
-    names, first, many = np.unique(
-        kinds, return_index=True, return_counts=True
-    )  # members of a kind stand together
+    # Members of a kind stand together.
+    names, first, many = np.unique(kinds, return_index=True, return_counts=True)
     kind = rng.choice(len(names), size=number, p=[_KINDS[name] for name in names])
     tokens = torch.from_numpy(first[kind] + rng.integers(many[kind]))
     on, boxes = _measured(vocabulary)
@@ -198,10 +197,8 @@ def _boxes(pairs: _Pairs) -> Int[Tensor, "n 2 dimensions"]:
     """A box around each result: not always the smallest."""
     a, b, kind = pairs.left.box, pairs.right.box, pairs.operation.view(-1, 1, 1)
     smaller, larger = torch.minimum(a, b), torch.maximum(a, b)
-    around, inside = (
-        torch.stack([smaller[:, 0], larger[:, 1]], 1),
-        torch.stack([larger[:, 0], smaller[:, 1]], 1),
-    )
+    around = torch.stack([smaller[:, 0], larger[:, 1]], 1)
+    inside = torch.stack([larger[:, 0], smaller[:, 1]], 1)
     return torch.where(kind == UNION, around, torch.where(kind == INTERSECT, inside, a))
 
 
@@ -209,9 +206,7 @@ def _canvases(pairs: _Pairs) -> Int[Tensor, "n words"]:
     """The results' canvases."""
     table, right = pairs.left.words, pairs.right
     step, start = max(1, _WORKSPACE // table.shape[1]), 0
-    for kind, many in enumerate(
-        pairs.operation.bincount(minlength=3).tolist()
-    ):  # pairs are sorted by operation
+    for kind, many in enumerate(pairs.operation.bincount(minlength=3).tolist()):  # pairs are sorted by it
         for first in range(start, start + many, step):
             rows = slice(first, min(first + step, start + many))
             a, b = table[rows], right[rows].words

@@ -33,9 +33,8 @@ class Plan:
     makes: Int[Tensor, " operations"]
     left: Int[Tensor, " operations"]
     right: Int[Tensor, " operations"]
-    rounds: list[
-        tuple[int, int]
-    ]  # 0 union, 1 intersect or 2 subtract, and how many, in the operations' order
+    # 0 union, 1 intersect or 2 subtract, and how many, in the operations' order
+    rounds: list[tuple[int, int]]
     result: Int[Tensor, " programs"]
 
 

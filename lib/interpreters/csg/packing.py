@@ -14,9 +14,8 @@ SIDE = 64  # pixels along each side of a canvas: what fits a word
 
 _BELOW = torch.tensor([(1 << k) - 1 for k in range(64)] + [-1])  # [k]: the k lowest bits are ON
 _BITS = (torch.arange(256).unsqueeze(1) >> torch.arange(8) & 1).byte()  # (256, 8): the bits of each byte
-_EIGHT = _BITS.view(torch.int64).squeeze(
-    1
-)  # (256,): the same, each row as one number, which is faster to look up
+# (256,): the same, each row as one number, which is faster to look up
+_EIGHT = _BITS.view(torch.int64).squeeze(1)
 
 
 def pack_runs(first: Int[Tensor, "*lines"], last: Int[Tensor, "*lines"]) -> Int[Tensor, "*lines"]:

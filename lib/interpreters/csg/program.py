@@ -32,9 +32,8 @@ class Operation:
 
     def __post_init__(self):
         if self.symbol not in OPERATIONS:
-            raise ProgramError(
-                f"{quoted(str(self.symbol))} is no operation", None, str(self.symbol), " ".join(OPERATIONS)
-            )
+            symbol = str(self.symbol)
+            raise ProgramError(f"{quoted(symbol)} is no operation", None, symbol, " ".join(OPERATIONS))
 
     @property
     def name(self) -> str:
@@ -113,9 +112,8 @@ class Program:
     statements: tuple[Statement, ...]
 
     def __post_init__(self):
-        object.__setattr__(
-            self, "statements", tuple(self.statements)
-        )  # a list could be changed, and has no hash
+        # A list could be changed, and has no hash.
+        object.__setattr__(self, "statements", tuple(self.statements))
         check(self.statements)
 
     def __len__(self) -> int:
@@ -168,14 +166,19 @@ class Program:
         """All numbers in text order."""
         return torch.tensor([number for primitive in self.primitives for number in primitive.numbers])
 
-    def parameter_names(self) -> list[str]:
+    @property
+    def structure(self) -> tuple[str, ...]:
+        """What is left without the parameters, such as ("c", "s", "-"): comparable and hashable."""
+        return tuple(s.kind if isinstance(s, Primitive) else s.symbol for s in self.statements)
+
+    def parameter_names(self) -> tuple[str, ...]:
         """A name for each number, such as "0:c:x": token, primitive, field."""
-        return [
+        return tuple(
             f"{index}:{statement.kind}:{field}"
             for index, statement in enumerate(self.statements)
             if isinstance(statement, Primitive)
             for field in KINDS[statement.kind].fields
-        ]
+        )
 
     def with_parameters(self, vector: Sequence[int] | Int[Tensor, " parameters"]) -> "Program":
         """The same structure with other numbers. Raises ProgramError for numbers that are off the canvas."""

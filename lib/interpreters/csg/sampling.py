@@ -75,7 +75,11 @@ class Rules:
 def sample(
     rng: np.random.Generator, dimensions: int = 2, length: int | None = None, rules: Rules = Rules()
 ) -> Program:
-    """One random program that follows the rules; its length is one of the paper's, unless given (an odd number)."""
+    """One random program that follows the rules; its length is one of the paper's, unless given (an odd number).
+
+    Raises ProgramError like `sample_many`.
+    """
+    _check_generator(rng)
     vocabulary = vocabulary_of(dimensions)
     length = int(rng.choice(LENGTHS[dimensions])) if length is None else length
     return vocabulary.program(sample_many(rng, 1, length, dimensions, rules)[0])
@@ -87,10 +91,12 @@ def sample_many(
 ) -> Int[Tensor, "number length"]:
     """Tokens of `number` different random programs of `length` tokens each, all following the rules, in random order.
 
-    Raises ProgramError for a number or a length that cannot be, and where hardly a program follows the rules.
+    Raises ProgramError for what is no Generator, for a number or a length that cannot be, and where hardly a program
+    follows the rules.
     """
     from .growing import grow
 
+    _check_generator(rng)
     if number < 0:
         raise ProgramError(f"{number} programs", expected="a whole number, at least 0")
     if length < 1 or length % 2 == 0 or length > LONGEST:
@@ -110,6 +116,12 @@ def sample_many(
         weights = rules if barren < _EQUAL else replace(rules, balanced=False)
         more = grow(rng, min(max(2 * missing, _FEWEST), _MOST[dimensions]), length, vocabulary, weights)
         found = _distinct(torch.cat([found, more]))
+
+
+def _check_generator(rng) -> None:
+    if not isinstance(rng, np.random.Generator):
+        expected = "a numpy Generator, such as np.random.default_rng(0)"
+        raise ProgramError(f"found {rng!r:.40}", expected=expected)
 
 
 def _quotas(rng: np.random.Generator, number: int) -> list[int]:

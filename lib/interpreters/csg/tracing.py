@@ -29,8 +29,10 @@ class Step:
 def trace(program: Program | Sequence[Statement]) -> list[Step]:
     """One step a token. Of a half-written program give its statements: the last stack then has several entries.
 
-    Raises ProgramError where an operation finds no two shapes, or plane and space are mixed.
+    Raises ProgramError for a text, where an operation finds no two shapes, or plane and space are mixed.
     """
+    if isinstance(program, str):
+        raise ProgramError("found a str", expected="a Program, see parse(text), or its statements")
     statements = program.statements if isinstance(program, Program) else tuple(program)
     if not statements:
         return []
@@ -59,6 +61,8 @@ def missing(statements: Sequence[Statement]) -> int:
 
 def parse_start(text: str) -> tuple[Statement, ...]:
     """The statements of a program that may be half written, or empty. Raises ProgramError for everything else."""
+    if not isinstance(text, str):
+        raise ProgramError(f"the program is a {type(text).__name__}", expected="a text")
     text = text.partition(STOP)[0]
     if not text.strip():
         return ()

@@ -27,6 +27,8 @@ from .primitives import KINDS, Primitive, draw, square_corners, triangle_corners
 from .program import OPERATIONS, STOP, Operation, Program
 
 CENTERS, SIZES = range(8, 57, 8), range(8, 33, 4)
+_SPANS = [f"{numbers[0]}, {numbers[1]}, … {numbers[-1]}" for numbers in (CENTERS, SIZES)]
+WORDS = "centers are {}, sizes {}, and nothing sticks out of the canvas".format(*_SPANS)  # for messages
 
 
 class Vocabulary:
@@ -49,7 +51,8 @@ class Vocabulary:
         return len(self.texts)
 
     def __repr__(self) -> str:
-        return f"Vocabulary({len(self.primitives)} primitives + {' '.join((*OPERATIONS, STOP))})"
+        others = " ".join((*OPERATIONS, STOP))
+        return f"Vocabulary({self.dimensions}D: {len(self.primitives)} primitives, then {others})"
 
     @property
     def stop(self) -> int:
@@ -60,7 +63,8 @@ class Vocabulary:
         """The token of a text such as "c(32,32,8)" or "+". Raises ProgramError; `place` is where it stood."""
         if text not in self._indices:
             found = f"{quoted(text)} is not among the {len(self)} tokens of the vocabulary"
-            raise ProgramError(found, place, text, f"one such as {self.texts[0]} or {self.texts[-2]}")
+            advice = f": {WORDS}" if self is vocabulary_of(self.dimensions) else ""
+            raise ProgramError(found, place, text, f"one such as {self.texts[0]} or {self.texts[-2]}{advice}")
         return self._indices[text]
 
     def canvases(self, device: torch.device | str = "cpu") -> Int[Tensor, "primitives lines"]:
@@ -76,13 +80,19 @@ class Vocabulary:
         for place, token in enumerate(tokens.tolist() if isinstance(tokens, Tensor) else tokens):
             index = operator.index(token) if hasattr(token, "__index__") else -1
             if not 0 <= index <= self.stop:
-                expected = f"0 to {self.stop}, where {self.stop} is {STOP}"
+                expected = self.expected_for(index, "vocabulary_of(3)")
                 raise ProgramError(f"{quoted(str(token))} is not a token", place, str(token), expected)
             if index == self.stop:
                 break
             is_primitive = index < len(self.primitives)
             statements.append(self.primitives[index] if is_primitive else Operation(self.texts[index]))
         return Program(tuple(statements))
+
+    def expected_for(self, index: int, advice: str) -> str:
+        """For messages: which tokens there are, and `advice` where an index that is none of them is one in space."""
+        in_space = self is vocabulary_of(2) and 0 <= index < len(vocabulary_of(3))
+        hint = f" (tokens of space: {advice})" if in_space else ""
+        return f"0 to {self.stop}, where {self.stop} is {STOP}{hint}"
 
 
 def _check_distinct(primitives: Sequence[Primitive]) -> None:

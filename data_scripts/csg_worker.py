@@ -1,7 +1,6 @@
 """A worker of make_csg_programs: makes one chunk of random programs."""
 
 import numpy as np
-import torch
 
 from data_scripts.parallel import end_with
 from lib.interpreters.csg import sample_many
@@ -12,7 +11,6 @@ Chunk = tuple[int, int, int]  # dimensions, tokens of a program, number of the c
 def make_chunk(seed: int, chunk: Chunk, programs: int, parent: int | None = None) -> tuple[Chunk, np.ndarray]:
     """The chunk and its tokens (programs, length) uint16, which depend on nothing but the arguments."""
     end_with(parent)
-    torch.set_num_threads(1)  # the processes share the cores
     dimensions, length, _ = chunk
     tokens = sample_many(np.random.default_rng([seed, *chunk]), programs, length, dimensions)
     return chunk, tokens.numpy().astype(np.uint16)

@@ -6,6 +6,7 @@ Rows are appended a batch at a time, in one write; a last line that a kill cut s
 
 import hashlib
 import json
+import os
 from pathlib import Path
 
 from lib.datasets import REPOSITORY, DataError
@@ -61,9 +62,13 @@ def write_whole(path: Path, content: bytes) -> None:
     if path.is_file() and path.read_bytes() == content:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name("half.part")  # not a longer name: the file's own may be as long as names can be
-    part.write_bytes(content)
-    part.replace(path)
+    # Not a longer name: the file's own may be as long as names can be. One a process: two may write to one folder.
+    part = path.with_name(f"half-{os.getpid()}.part")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def code_digest(*parts: str) -> str:

@@ -12,6 +12,7 @@ of workers, and however often the run was interrupted: a killed run goes on from
 """
 
 import argparse
+import hashlib
 import io
 import json
 import shutil
@@ -59,6 +60,7 @@ class Parts:
 
     def __init__(self, folder: Path, settings: dict):
         self.folder = folder
+        self._locked = _lock(folder)
         text = json.dumps(settings)
         made = folder / "settings.json"
         if made.exists() and (begun := made.read_text(errors="replace")) != text:
@@ -89,6 +91,22 @@ class Parts:
             raise DataError(
                 f"{path} is damaged ({error}); remove it, and the same command makes it again"
             ) from error
+
+
+def _lock(folder: Path) -> io.IOBase | None:
+    """An open file that no other run has open, until this process ends. Raises DataError where one has."""
+    try:
+        import fcntl
+    except ImportError:  # not on Windows
+        return None
+    folder.mkdir(parents=True, exist_ok=True)
+    file = (folder / "lock").open("w")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        file.close()
+        raise DataError(f"another run is filling {folder}; wait for it, or choose another --out") from None
+    return file
 
 
 def make_all(options: argparse.Namespace, parts: Parts, wanted: dict[int, int]) -> dict[int, np.ndarray]:
@@ -186,27 +204,31 @@ def run(options: argparse.Namespace) -> None:
     settings = {"dimensions": options.dimensions, "seed": options.seed, "share": options.share}
     settings["code"] = code_digest("interpreters/csg")
     before = _read(told) if path.exists() else {}
-    if settings.items() <= before.items():
+    if settings.items() <= before.items() and before.get("sha256") == _digest(path):
         print(f"{path} is there already, made with the same settings: nothing to do")
         # A run that was killed at its very end may have left them.
         shutil.rmtree(options.out / f"{name}.parts", ignore_errors=True)
         return
-    if before and not options.force:
+    if before and not settings.items() <= before.items() and not options.force:
         changes = difference(before, settings)
         raise DataError(f"{path} was made with other settings ({changes}); choose another --out, or --force")
     wanted = sizes(options.dimensions, options.share)
     parts = Parts(options.out / f"{name}.parts", settings)
-    told.unlink(missing_ok=True)  # from here on the two files might not belong together
     programs = make_all(options, parts, {length: sum(row.values()) for length, row in wanted.items()})
     arrays = split_up(programs, wanted, options)
+    told.unlink(missing_ok=True)  # until it is written again, the two files might not belong together
     write(path, arrays)
-    content = summary(arrays, settings)
+    content = summary(arrays, settings) | {"sha256": _digest(path)}
     write_whole(told, (json.dumps(content, indent=2) + "\n").encode())
     shutil.rmtree(parts.folder)
     took = f"{path.stat().st_size / 1e6:.3g} MB, {time.monotonic() - started:.0f} s"
     print(
         f"{_told(content)}; {took}, in {path}, where lib.datasets.csg_programs({options.dimensions}) reads it"
     )
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _read(told: Path) -> dict:

@@ -46,7 +46,7 @@ CODE = ("lib/interpreters/rasterising.py", "data_scripts/make_logos.py")  # what
 LIST, ICONS = "package/data/simple-icons.json", "package/icons/"
 BOX = 'viewBox="0 0 24 24"'  # every icon's
 LICENCE = "simple-icons is CC0-1.0; icons with a licence of their own were left out; trademarks remain their owners'"
-DAMAGED = (tarfile.TarError, zlib.error, EOFError, ValueError, KeyError, TypeError)
+DAMAGED = (tarfile.TarError, zlib.error, EOFError, ValueError, KeyError, TypeError, RecursionError)
 
 
 def icons(package: Path) -> list[tuple[dict, str]]:

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-import torch
 from tqdm import tqdm
 
 from data_scripts import mask_files, sweethome
@@ -45,6 +44,7 @@ from lib.datasets import (
 from lib.datasets.images import SHARES, read, split_of, views_of
 from lib.interpreters.rasterising import VIEWS, box_triangles, silhouettes
 from lib.interpreters.shapeassembly import ProgramError, execute_many
+from lib.interpreters.threads import one_thread
 
 CHUNK = 32  # shapes a worker takes at once; fixed, because a batch of programs is executed together
 OUT = (
@@ -153,7 +153,8 @@ def draw_models(items: list[Item]) -> list[Drawn]:
 def _drawn(item: Item, triangles: Callable) -> Drawn:
     try:
         return Drawn(*item[:3], dict(zip(VIEWS, silhouettes(triangles()))))
-    except (ValueError, ProgramError) as error:  # of thousands of shapes, one may be nothing to see
+    # Of thousands of shapes, one may be nothing to see, or damaged.
+    except (ValueError, IndexError, KeyError, ProgramError) as error:
         return Drawn(*item[:3], problem=f"no shape: {error}")
 
 
@@ -174,8 +175,8 @@ def draw_all(name: str, source: Source, total: int, items: Iterable[Item], count
 def draw_chunk(number: int, draw: Callable, items: list[Item], parent: int | None) -> tuple:
     """A worker's task; its number comes back with its results. A process other than `parent` ends with that one."""
     end_with(parent)
-    torch.set_num_threads(1)  # the processes share the cores; and sums come in the same order everywhere
-    return number, draw(items)
+    with one_thread():  # the processes share the cores; and sums come in the same order everywhere
+        return number, draw(items)
 
 
 def make_one(name: str, options: argparse.Namespace) -> str:

@@ -45,7 +45,10 @@ WORDS = [  # what a name says it is; the first that fits counts ("Desk lamp" is 
     ("table", r"table"),
     ("storage", r"cabinet|wardrobe|shelves|bookcase|cupboard|drawers|chest|tv stand"),
 ]
-DAMAGED = (tarfile.TarError, zipfile.BadZipFile, LZMAError, zlib.error, EOFError, ValueError, KeyError)
+DAMAGED = (
+    *(tarfile.TarError, zipfile.BadZipFile, LZMAError, zlib.error),
+    *(EOFError, ValueError, KeyError, NotImplementedError, RuntimeError),
+)
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,8 @@ def members(package: Path) -> Iterator[tuple[str, bytes]]:
                         if member.isreg() and member.name.endswith((".sh3f", "/copyright")):
                             yield member.name, archive.extractfile(member).read()
                 return
+            if size < 0:
+                raise ValueError(f"{name} has a size of {size}")
             file.seek(size + size % 2, io.SEEK_CUR)  # members begin at even places
     raise ValueError("it holds no data.tar")
 

@@ -116,6 +116,8 @@ def test_points_come_in_any_form_and_the_canvas_does_not_cut():
         assert shape.occupancy(made).tolist() == expected
     assert shape.occupancy(torch.zeros(0, 2)).shape == (0,)
     many = torch.rand(300_000, 2, generator=torch.Generator().manual_seed(0)) * 64  # more than one step takes
+    assert shape.occupancy(np.array(points)[::-1]).tolist() == expected[::-1]
+    assert shape.occupancy(np.array(points, dtype=">f8")).tolist() == expected  # another machine's byte order
     assert torch.equal(shape.occupancy(many), (many.double() - torch.tensor([2, 32])).norm(dim=1) < 20)
 
 
@@ -189,6 +191,23 @@ def test_a_plate_is_the_picture_seen_from_above():
     apex = plate.vertices[plate.vertices[:, 1].argmax()]
     assert apex[1] == 63 - 11.5  # the apex is drawn in row 12, counted from above
     assert apex[0] == pytest.approx(32, abs=1)
+
+
+@pytest.mark.parametrize("height", [1e-6, 1e-3, 1.0, 1e6])
+def test_plates_of_any_height_keep_their_shape(height):
+    shape = execute(parse("t(32,40,28)s(32,48,8)-c(4,4,2)+"))
+    plate = shape.mesh(height)
+    assert plate.is_watertight and plate.bounds[:, 2].tolist() == [0, height]
+    assert plate.volume == pytest.approx(height * shape.area, rel=1e-4)
+
+
+def test_whole_numbers_of_numpy_and_torch_count(unchecked_shapes):
+    for text in ("c(32,32,16)", "sp(32,32,32,16)"):
+        shape = execute(parse(text))
+        for eight in (np.int64(8), np.uint8(8), torch.tensor(8)):
+            assert torch.equal(shape.voxels(eight), shape.voxels(8))
+            assert shape.mesh(segments=eight).volume == shape.mesh(segments=8).volume
+            assert torch.equal(shape.surface_points(eight), shape.surface_points(8))
 
 
 @pytest.mark.parametrize("text", ["s(16,16,8)s(27,27,8)+", "c(24,32,8)c(40,32,8)+", "s(32,32,28)c(32,32,8)-"])
@@ -400,19 +419,37 @@ def test_a_shape_without_an_inside_says_so(text):
 @pytest.mark.parametrize(
     "ask, message",
     [
-        (lambda p, s: p.occupancy(torch.zeros(5, 3)), r"points of shape \(5, 3\); expected \(n, 2\): x, y"),
-        (lambda p, s: s.occupancy(np.zeros(3)), r"points of shape \(3,\); expected \(n, 3\): x, y, z"),
+        (
+            lambda p, s: p.occupancy(torch.zeros(5, 3)),
+            r"points of shape \(5, 3\); expected \(n, 2\) numbers: x, y",
+        ),
+        (
+            lambda p, s: s.occupancy(np.zeros(3)),
+            r"points of shape \(3,\); expected \(n, 3\) numbers: x, y, z",
+        ),
+        (lambda p, s: p.occupancy(None), r"a NoneType; expected points \(n, 2\) numbers: x, y"),
+        (lambda p, s: p.occupancy([[1, "2"]]), r"a list; expected points \(n, 2\) numbers"),
+        (lambda p, s: p.occupancy(np.array([["1", "2"]])), "an array of <U1; expected points"),
+        (lambda p, s: s.occupancy(np.ones((4, 3)) * 1j), r"complex points; expected \(n, 3\) numbers"),
+        (lambda p, s: p.occupancy([[1j, 2]]), r"complex points; expected \(n, 2\) numbers"),
         (lambda p, s: p.voxels(0), "a resolution of 0; expected a whole number, at least 1"),
+        (lambda p, s: s.voxels(8.0), "a resolution of 8.0"),
+        (lambda p, s: s.voxels(True), "a resolution of True"),
         (lambda p, s: s.mesh(6), "6 segments; expected a multiple of 4 from 4 to 1024"),
         (lambda p, s: s.mesh(2048), "2048 segments"),
         (lambda p, s: p.outline(0), "0 segments"),
-        (lambda p, s: p.mesh(0.0), "a height of 0.0; expected more than 0 pixels"),
+        (lambda p, s: p.outline(64.0), "64.0 segments"),
+        (lambda p, s: p.mesh(0.0), r"a height of 0.0; expected 1e-06 to 1e\+06 pixels"),
+        (lambda p, s: p.mesh(1e-9), "a height of 1e-09; expected 1e-06"),
+        (lambda p, s: p.mesh(-8.0), "a height of -8.0"),
+        (lambda p, s: p.mesh(math.inf), "a height of inf"),
         (lambda p, s: p.mesh(math.nan), "a height of nan"),
         (lambda p, s: p.surface_points(-1), "-1 points; expected a whole number, at least 0"),
         (lambda p, s: s.surface_points(-1), "-1 points"),
+        (lambda p, s: s.surface_points(2.5), "2.5 points"),
         (lambda p, s: p.to_svg('"/><script>'), "expected a colour such as '#5e8bba' or 'black'"),
     ],
 )
-def test_messages(ask, message):
+def test_messages(unchecked_shapes, ask, message):
     with pytest.raises(ValueError, match=message):
         ask(execute(parse("c(32,32,16)")), execute(parse("sp(32,32,32,16)")))

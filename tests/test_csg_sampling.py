@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from lib.interpreters.csg import LENGTHS, ProgramError, Rules, growing, sample, sample_many, vocabulary_of
+from lib.interpreters.csg.sampling import LONGEST_SAMPLED
 from tests.conftest import unchecked
 from tests.csg_programs import SIDE, mask
 
@@ -253,9 +254,10 @@ def test_without_rule_d_unions_dominate(unchecked_shapes):
 # What cannot be
 
 
-@pytest.mark.parametrize("length", [-1, 0, 2, 8, 1024, 1025])
-def test_lengths_that_no_program_has(length):
-    with pytest.raises(ProgramError, match=f"programs of {length} tokens; expected an odd number from 1 to"):
+@pytest.mark.parametrize("length", [-1, 0, 2, 8, 52, 53, 101, 1025, 5.0, 2.5, "5"])
+def test_lengths_that_no_program_has(unchecked_shapes, length):
+    message = f"programs of {length!r} tokens; expected an odd number from 1 to 51: longer ones take minutes"
+    with pytest.raises(ProgramError, match=message):
         drawn(3, length)
     with pytest.raises(ProgramError, match="expected an odd number"):
         sample(np.random.default_rng(0), 2, length)
@@ -273,6 +275,16 @@ def test_no_programs(length):
     assert drawn(0, length).shape == (0, length)
     with pytest.raises(ProgramError, match="-2 programs; expected a whole number, at least 0"):
         drawn(-2, length)
+
+
+@pytest.mark.parametrize("number", [2.5, 2.0, "2", None])
+def test_numbers_that_are_not_whole(unchecked_shapes, number):
+    with pytest.raises(ProgramError, match=f"{number!r} programs; expected a whole number, at least 0"):
+        drawn(number, 5)
+
+
+def test_whole_numbers_of_numpy_and_torch_count(unchecked_shapes):
+    assert torch.equal(drawn(np.int64(3), torch.tensor(5)), drawn(3, 5))
 
 
 @pytest.mark.parametrize(
@@ -310,4 +322,4 @@ def test_every_tree_is_as_likely(operations):
 
 
 def test_long_programs(unchecked_shapes):
-    assert len(vocabulary_of(2).program(drawn(1, 31)[0])) == 31
+    assert len(vocabulary_of(2).program(drawn(1, LONGEST_SAMPLED)[0])) == LONGEST_SAMPLED

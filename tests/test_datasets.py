@@ -186,3 +186,96 @@ def test_part_graphs_of_partnet_are_read_where_they_were_put(tmp_path, monkeypat
 def test_part_graphs_of_an_unknown_category():
     with pytest.raises(DataError, match="choose one of chair, table, storage"):
         datasets.part_graphs("lamp")
+
+
+# ---- CSG programs ----
+
+
+def test_csg_programs_are_made_on_the_spot(no_real_data):
+    programs = datasets.csg_programs(2, length=5)
+    assert programs.source == "embedded" and len(programs) == sum(datasets.csg.EMBEDDED.values())
+    assert programs.tokens.shape == (len(programs), 6) and (programs.tokens[:, 5] == 399).all()
+    assert len(programs[0]) == 5 and len(programs[3:7]) == 4 and "on the spot" in programs.describe()
+    splits = [
+        set(map(tuple, datasets.csg_programs(2, split, 5).tokens.tolist())) for split in datasets.CSG_SPLITS
+    ]
+    assert sum(map(len, splits)) == len(set.union(*splits)) == len(programs)
+
+
+@pytest.fixture
+def made_programs(tmp_path, monkeypatch):
+    """A small made file; `change(name, tokens)` replaces one of its arrays."""
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path))
+    arrays = {
+        f"{split}_{length}": datasets.csg_programs(2, split, length)
+        .tokens[:4, :length]
+        .numpy()
+        .astype(np.uint16)
+        for split in datasets.CSG_SPLITS
+        for length in datasets.CSG_SIZES[2]
+    }
+    (tmp_path / "csg").mkdir()
+
+    def change(name=None, tokens=None):
+        path = tmp_path / "csg" / "programs_2d.npz"
+        np.savez_compressed(path, **arrays | ({name: tokens} if name else {}))
+        return path
+
+    change()
+    return change
+
+
+def test_csg_programs_are_read_where_they_were_made(made_programs):
+    programs = datasets.csg_programs(2, "val", 5)
+    assert programs.source == "made" and len(programs) == 4 and "made by" in programs.describe()
+    assert len(datasets.csg_programs(2)) == 4 * 3 * 6
+
+
+@pytest.mark.parametrize(
+    "tokens, message",
+    [
+        (np.full((2, 3), 65535, np.uint16), "rows that are no programs"),
+        (np.zeros((2, 3), np.uint16), "rows that are no programs"),
+        (np.zeros((2, 4), np.uint16), r"expected uint16 \(programs, 3\)"),
+        (np.zeros((2, 3), np.int64), r"expected uint16 \(programs, 3\)"),
+    ],
+)
+def test_csg_programs_that_are_none(made_programs, tokens, message):
+    made_programs("test_3", tokens)
+    with pytest.raises(DataError, match=message):
+        datasets.csg_programs(2, "test", 3)
+
+
+def test_a_damaged_file_of_csg_programs_says_how_to_mend_it(made_programs):
+    path = made_programs()
+    path.write_bytes(path.read_bytes()[:500])
+    with pytest.raises(DataError, match="damaged.*make_csg_programs --dimensions 2"):
+        datasets.csg_programs(2, "test", 3)
+    with path.open("wb") as file:
+        np.save(file, np.zeros(3))  # another kind of file under that name
+    with pytest.raises(DataError, match="damaged"):
+        datasets.csg_programs(2, "test", 3)
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        ((4,), "choose 2 or 3"),
+        (("train",), r"did you mean split='train'\?"),
+        ((2.0,), "choose 2 or 3"),
+        ((2, "dev"), "unknown split 'dev'"),
+        ((2, None, 4), "unknown length 4: choose one of 3, 5, 7, 9, 11, 13"),
+        ((3, None, 9), "choose one of 3, 5, 7"),
+        ((2, None, 3.0), "unknown length 3.0"),
+    ],
+)
+def test_other_csg_programs_there_are_none(no_real_data, unchecked_shapes, arguments, message):
+    with pytest.raises(DataError, match=message):
+        datasets.csg_programs(*arguments)
+
+
+def test_the_data_root_must_be_a_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DataError, match="which is a file; expected a folder"):
+        datasets.data_root()

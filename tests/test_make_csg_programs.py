@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from data_scripts import csg_worker, make_csg_programs
-from lib.datasets import CSG_SIZES, CSG_SPLITS, csg_programs
+from lib.datasets import CSG_SIZES, CSG_SPLITS, DataError, csg_programs
 from lib.interpreters.csg import execute_many, sample_many, vocabulary_of
 from tests.conftest import unchecked
 
@@ -379,3 +379,18 @@ def test_the_whole_is_the_papers_table():
         for split in CSG_SPLITS
     ]
     assert totals == [1_225_000, 95_000, 355_000, 700_000, 70_000, 140_000]
+
+
+def test_what_is_damaged_after_it_was_made_is_made_again(tmp_path, quick):
+    whole = run(tmp_path)
+    (tmp_path / "programs_2d.npz").write_bytes(whole["programs_2d.npz"][:1000])
+    assert run(tmp_path) == whole
+
+
+def test_two_runs_at_once_do_not_fill_one_folder(tmp_path):
+    folder = tmp_path / "programs_2d.parts"
+    first = make_csg_programs.Parts(folder, {"seed": 0})
+    with pytest.raises(DataError, match="another run is filling .*programs_2d.parts"):
+        make_csg_programs.Parts(folder, {"seed": 0})
+    first._locked.close()
+    make_csg_programs.Parts(folder, {"seed": 0})

@@ -367,3 +367,9 @@ def pairs(shared) -> dict[str, torch.Tensor]:
         bits = np.unpackbits(found[name].numpy(), axis=-1)
         found[name] = torch.from_numpy(bits.reshape(-1, 64, 64).astype(bool))
     return found
+
+
+def test_very_wide_images_are_refused_instead_of_filling_the_memory(unchecked_shapes):
+    wide = torch.zeros(1, 1, 8193, dtype=torch.bool)
+    with pytest.raises(ValueError, match="found images 8193 pixels wide; expected at most 8192"):
+        distance_transform(wide)

@@ -191,6 +191,22 @@ def test_long_titles_break_after_a_token():
     assert figure.axes[0].texts[0].get_text() == "s(32,40,24)\nt(32,16,16)+\ns(32,48,8)-\nc(48,32,8)-"
 
 
+@pytest.mark.parametrize("title", ["c(32,32,8)$$", "$", r"$\frac{$", "$x$ and $y$"])
+def test_dollars_in_titles_are_letters(title):
+    figures = [
+        show_pictures([RING], [title]),
+        show_difference(RING, HOUSE, (title, title)),
+        show_primitives([RING], [title]),
+        show_solids([CUP], [title], size=1),
+    ]
+    for figure in figures:
+        pixels(figure)
+        ax = figure.axes[0]
+        texts = [*ax.texts, ax.xaxis.label, *(ax.get_legend().get_texts() if ax.get_legend() else ())]
+        assert any(title in text.get_text() for text in texts)
+        assert not any(text.get_parse_math() for text in texts if text.get_text())
+
+
 def test_a_difference_counts_its_three_parts():
     figure = show_difference(RING, "c(32,32,24)", ("target", "found"))
     a, b = image_of(RING), image_of("c(32,32,24)")
@@ -283,6 +299,17 @@ def test_solids_stand_side_by_side():
         show_solids(RING)
     with pytest.raises(ValueError, match="expected grid"):
         voxel_mesh(np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize(
+    "kind", [torch.bool, torch.uint8, torch.int64, torch.float32, torch.bfloat16], ids=str
+)
+def test_grids_of_any_numbers_are_booleans(kind):
+    row = torch.tensor([1, 2, 0]).view(3, 1, 1).to(kind)
+    assert voxel_mesh(row).volume == pytest.approx(2) and len(voxel_mesh(row).faces) == 20
+    array = np.array([1, 2, 0]).reshape(3, 1, 1)
+    assert np.array_equal(voxel_mesh(row).vertices, voxel_mesh(array).vertices)
+    assert len(show_solids(torch.ones(4, 4, 4, dtype=kind), size=1).axes) == 1
 
 
 # The playground without a browser
@@ -436,6 +463,47 @@ def test_a_target_is_compared_with_the_top_of_the_stack():
     assert Playground(RING).iou is None and Playground(target=RING).iou is None
     with pytest.raises(ValueError, match="expected"):
         Playground(target=np.zeros((8, 8)))
+
+
+@pytest.mark.parametrize(
+    "message, reason",
+    [
+        ({"do": "push", "with": [5]}, "the token is a int; expected a primitive such as c(32,32,8)"),
+        ({"do": "push", "with": [[]]}, "the token is a list"),
+        ({"do": "push", "with": []}, "push came with 0 values; expected 1"),
+        ({"do": "push"}, "push came with 0 values"),
+        ({"do": "push", "with": None}, "push came with a NoneType; expected a list of values"),
+        ({"do": "push", "with": "+"}, "push came with a str"),
+        ({"do": "load"}, "load came with 0 values; expected 1"),
+        ({"do": "load", "with": [None]}, "the program is a NoneType; expected a text"),
+        ({"do": "undo", "with": [1]}, "undo came with 1 values; expected 0"),
+        ({"do": "look", "with": [0, 1]}, "look came with 2 values; expected 0 or 1"),
+        ({"do": "look", "with": [-1]}, "there is no token -1; expected a place from 0 to 2"),
+        ({"do": "look", "with": [1.5]}, "there is no token 1.5"),
+        ({"do": "look", "with": ["a"]}, "there is no token 'a'"),
+    ],
+    ids=str,
+)
+def test_a_message_that_makes_no_sense_is_answered_on_the_page(unchecked_shapes, message, reason):
+    playground = Playground(RING)
+    playground._on_message(playground, message, [])
+    assert reason in playground.view["error"]["message"] and playground.text == RING
+
+
+def test_messages_that_ask_for_nothing_change_nothing(unchecked_shapes):
+    playground = Playground(RING)
+    for message in (None, 5, [], {}, {"do": None}, {"do": []}, {"with": ["+"]}):
+        playground._on_message(playground, message, [])
+    assert playground.text == RING and playground.view["error"] is None
+
+
+def test_an_empty_playground_has_nothing_to_look_at(unchecked_shapes, playground):
+    with pytest.raises(ProgramError, match="there is no token 0; expected no place: the program is empty"):
+        playground.look(0)
+    playground.look()
+    for make in (Playground, playground.load):
+        with pytest.raises(ProgramError, match="the program is a NoneType; expected a text"):
+            make(None)
 
 
 def test_the_browser_may_ask_for_nothing_else():

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from lib.metrics.distances import distance_transform
-from lib.viewing.csg_figures import show_distances
+from lib.viewing.csg_figures import show_distances, show_points
 
 
 def edges_at(side: int, *places: tuple[int, int]) -> torch.Tensor:
@@ -25,11 +25,22 @@ def test_small_maps_show_every_number_and_frame_the_marks():
 
 def test_large_maps_show_lines_instead():
     (ax,) = show_distances([distance_transform(edges_at(64, (32, 32)))], ["far"]).axes
-    assert not ax.texts and len(ax.collections) == 1
+    assert len(ax.collections) == 1
     assert ax.collections[0].levels.tolist() == [8, 16, 24, 32, 40]
+    marks = {text.get_text() for text in ax.texts}
+    assert marks and marks <= {"8", "16", "24", "32", "40"}
 
 
 @pytest.mark.parametrize("titles, marks", [(["a", "b"], None), (["a"], [])])
 def test_titles_and_marks_are_one_each(titles, marks):
     with pytest.raises(ValueError, match="1 maps need"):
         show_distances([torch.zeros(8, 8)], titles, marks)
+
+
+def test_points_have_markers_ticks_and_numbers():
+    (ax,) = show_points([1, 3, 5], [0.5, 0.125, 0.0625], "tokens", "share", "title").axes
+    (line,) = ax.lines
+    assert line.get_xdata().tolist() == ax.get_xticks().tolist() == [1, 3, 5] and line.get_marker() == "o"
+    assert [text.get_text() for text in ax.texts] == ["0.5", "0.12", "0.062"] and ax.get_legend() is None
+    with pytest.raises(ValueError, match="1 heights for 2 places"):
+        show_points([1, 3], [0.5], "x", "y", "t")

@@ -1,10 +1,28 @@
 """What every data set is: items in a fixed order, and the folder that fetched and made ones live in."""
 
 import os
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 REPOSITORY = Path(__file__).parents[2]
+UNREADABLE = (  # what numpy and zipfile raise for one or another kind of damage
+    *(
+        OSError,
+        EOFError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        MemoryError,
+        NotImplementedError,
+        RuntimeError,
+    ),
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError),
+)
 CATEGORIES = ("chair", "table", "storage")
 
 
@@ -33,7 +51,23 @@ class DataSet(Sequence):
 
 def data_root() -> Path:
     """The folder of fetched data sets: SHAPE_PROGRAMS_DATA, or data/ in the repository."""
-    return Path(os.environ.get("SHAPE_PROGRAMS_DATA") or REPOSITORY / "data")
+    named = os.environ.get("SHAPE_PROGRAMS_DATA")
+    root = Path(named).expanduser() if named else REPOSITORY / "data"
+    if root.is_file():
+        raise DataError(f"SHAPE_PROGRAMS_DATA names {root}, which is a file; expected a folder")
+    return root
+
+
+def read_arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Arrays of a .npz file by name. Raises KeyError for one that is not there, DataError for a damaged file."""
+    try:
+        with np.load(path) as file:  # never unpickles: that is numpy's default
+            arrays = {name: file[name] for name in names}
+    except UNREADABLE as error:
+        raise DataError(f"{path}: cannot be read, or is damaged ({error})") from error
+    if not all(isinstance(array, np.ndarray) for array in arrays.values()):
+        raise DataError(f"{path}: cannot be read, or is damaged (a member is no array)")
+    return arrays
 
 
 def choose(what: str, value: str | None, choices: tuple[str, ...]) -> tuple[str, ...]:

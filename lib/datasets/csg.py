@@ -4,8 +4,6 @@ programs = csg_programs(2, split="train")     a TokenSet: a sequence of Program
 programs.tokens                               (n, longest) int64, padded with `$`: what networks and executors take
 """
 
-import zipfile
-import zlib
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -17,7 +15,7 @@ from torch import Tensor
 
 from lib.interpreters.csg import Program, Vocabulary, sample_many, vocabulary_of
 
-from .base import DataError, choose, data_root
+from .base import DataError, choose, data_root, read_arrays
 
 SPLITS = ("train", "val", "test")
 SIZES = {  # programs by dimension, tokens and split: CSGNet's Table 1
@@ -77,10 +75,11 @@ def csg_programs(dimensions: int = 2, split: str | None = None, length: int | No
     length      only programs of so many tokens: 3, 5, … 13 in the plane, 3, 5, 7 in space.
     Raises DataError for other ones, and for a file that is damaged.
     """
-    if dimensions not in SIZES:
-        raise DataError(f"unknown number of dimensions {dimensions!r}: choose 2 or 3")
+    if not isinstance(dimensions, int) or dimensions not in SIZES:
+        hint = f"; did you mean split={dimensions!r}?" if dimensions in SPLITS else ""
+        raise DataError(f"unknown number of dimensions {dimensions!r}: choose 2 or 3{hint}")
     lengths = tuple(SIZES[dimensions]) if length is None else (length,)
-    if not set(lengths) <= set(SIZES[dimensions]):
+    if not all(isinstance(n, int) and n in SIZES[dimensions] for n in lengths):
         raise DataError(f"unknown length {length!r}: choose one of {', '.join(map(str, SIZES[dimensions]))}")
     splits = choose("split", split, SPLITS)
     path = data_root() / "csg" / f"programs_{dimensions}d.npz"
@@ -118,13 +117,17 @@ def _embedded(dimensions: int, length: int) -> dict[str, Int[Tensor, "n length"]
 def _read(path: Path, name: str, length: int) -> Int[Tensor, "n length"]:
     again = f"make it again: python -m data_scripts.make_csg_programs --dimensions {path.stem[-2]}"
     try:
-        with np.load(path) as file:  # never unpickles: that is numpy's default
-            tokens = file[name]
+        tokens = read_arrays(path, [name])[name]
     except KeyError as error:
         raise DataError(f"{path}: there is no {name} in it; {again}") from error
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
-        raise DataError(f"{path}: cannot be read, or is damaged ({error}); {again}") from error
+    except DataError as error:
+        raise DataError(f"{error}; {again}") from error
     if tokens.dtype != np.uint16 or tokens.ndim != 2 or tokens.shape[1] != length:
         found = f"{tokens.dtype} {tokens.shape}"
         raise DataError(f"{path}: found {name} {found}, expected uint16 (programs, {length}); {again}")
-    return torch.from_numpy(tokens.astype(np.int64))
+    tokens = torch.from_numpy(tokens.astype(np.int64))
+    primitives = len(vocabulary_of(int(path.stem[-2])).primitives)
+    depth = torch.where(tokens < primitives, 1, -1).cumsum(1)
+    if tokens.numel() and (tokens.max() > primitives + 2 or depth.min() < 1 or depth[:, -1].max() > 1):
+        raise DataError(f"{path}: {name} has rows that are no programs; {again}")
+    return tokens

@@ -7,7 +7,7 @@ from itertools import product
 from jaxtyping import Bool
 from torch import Tensor
 
-from ..interpreters.csg import OPERATIONS, Picture, Program, ProgramError, execute, parse
+from ..interpreters.csg import OPERATIONS, Picture, Program, ProgramError, execute, parse, vocabulary_of
 from ..metrics.images import iou
 from . import OK, UNANSWERED, hint
 
@@ -15,7 +15,8 @@ LARGE = 3600  # pixels of exercise 8.2; the most that five tokens can switch on 
 ALIKE = 0.95  # intersection over union of exercise 8.4
 LONGEST = 13  # tokens that a network may write
 LONG_WINDED = "c(24,32,20)c(24,32,12)+s(40,40,16)+s(40,40,16)c(40,40,8)+c(48,48,8)s(40,40,16)*+-"
-_HOUSE = "s(32,40,20)t(32,24,24)+s(32,48,8)-c(32,24,8)-"
+_HOUSE = "s(32,40,24)t(32,24,24)+s(32,48,12)-c(32,24,8)-"
+_GRID = "centers are 8, 16, … 56, sizes 8, 12, … 32, and nothing may stick out of the canvas"
 _WRITTEN = {"primitive": ("c(32,32,16)", "s(24,40,12)", "t(32,24,20)"), "operation": tuple(OPERATIONS)}
 
 
@@ -103,14 +104,16 @@ def _picture(answer: object, tokens: int | None = None) -> Picture | str:
     if answer is None:
         return UNANSWERED
     if not isinstance(answer, str | Program):
-        return hint(f"the answer is a program as a text, this is a {type(answer).__name__}")
+        return hint(f"the answer is a program as a text, this is of type {type(answer).__name__}")
     try:
         program = answer if isinstance(answer, Program) else parse(answer)
         if program.dimensions != 2:
             return hint("this is a program of space; write one of the plane, with c, s and t")
-        program.tokens()  # is every primitive in the vocabulary?
     except ProgramError as error:
         return hint(str(error))
+    for primitive in program.primitives:
+        if primitive not in vocabulary_of(2).primitives:
+            return hint(f"{primitive} is not among the 400 tokens: {_GRID}")
     if tokens is not None and len(program) != tokens:
         return hint(f"it has {len(program)} token{'s' * (len(program) != 1)}, write {tokens}")
     return execute(program)

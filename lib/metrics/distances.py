@@ -21,6 +21,7 @@ from .edges import PIXELS_AT_ONCE, check_images, in_parts
 
 STRAIGHT, DIAGONAL = 0.955, 1.3693  # OpenCV's cost of a step, px
 CANDIDATES_AT_ONCE = 1 << 18  # so that they stay in the cache
+WIDEST = 8192  # pixels: the distances between all columns are in one table
 
 
 def distance_transform(
@@ -45,15 +46,17 @@ def distances_at(
     """From each of the k pixels to the nearest edge pixel of its image, px, and the number of that image.
 
     Pixels come in the order of their images, then rows, then columns. In an image without edges the distance is
-    meaningless. Raises ValueError for an unknown distance.
+    meaningless. Raises ValueError for an unknown distance and for images wider than WIDEST.
     """
     nearest = _named(distance)
     n, h, w = edges.shape
+    if w > WIDEST:
+        raise ValueError(f"found images {w} pixels wide; expected at most {WIDEST}")
     dy = _within_columns(edges).view(n * h, w)  # a row of this holds one pixel's candidates
     column = torch.arange(w, device=edges.device)
     dx = (column[:, None] - column).abs().to(dy.dtype)
     image, i, j = pixels.nonzero(as_tuple=True)
-    rows, columns = (in_parts(number, CANDIDATES_AT_ONCE // w) for number in (image * h + i, j))
+    rows, columns = (in_parts(number, max(1, CANDIDATES_AT_ONCE // w)) for number in (image * h + i, j))
     found = [nearest(dy.index_select(0, row), dx.index_select(0, j)) for row, j in zip(rows, columns)]
     return torch.cat(found), image
 

@@ -94,7 +94,7 @@ def test_a_wrong_validity(answer, expected):
         ("c(32,32,8)+", "finds 1 shape"),
         ("c(33,32,8)c(32,32,8)+", "c(33,32,8) is not among the 400 tokens: centers are 8, 16"),
         ("c(32,32,8)c(32,32,30)+", "sizes 8, 12, … 32"),
-        ("c(32,32,8)c(8,32,12)+", "nothing may stick out of the canvas"),
+        ("c(32,32,8)c(8,32,12)+", "nothing sticks out of the canvas"),
         ("sp(32,32,32,8)", "program of space"),
         ("cu(32,32,32,8)sp(32,32,32,8)+", "program of space"),
     ],
@@ -150,3 +150,20 @@ def test_house():
         assert "will do" in check_house(text), part
     assert "15 tokens" in check_house(HOUSE + "s(32,48,12)-" * 4)
     assert "will do" in check_house("c(16,16,8)c(48,48,8)*")
+
+
+class _Rude:
+    def __str__(self):
+        raise RuntimeError
+
+    __repr__ = __str__
+
+
+def _leaves(tokens):
+    raise SystemExit
+
+
+@pytest.mark.parametrize("answer", [lambda tokens: _Rude(), _leaves, lambda tokens: "x" * 10**6])
+def test_the_validity_checker_survives_rude_answers(answer):
+    verdict = check_validity(answer)
+    assert verdict.startswith("not yet") and len(verdict) < 300

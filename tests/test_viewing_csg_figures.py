@@ -44,3 +44,11 @@ def test_points_have_markers_ticks_and_numbers():
     assert [text.get_text() for text in ax.texts] == ["0.5", "0.12", "0.062"] and ax.get_legend() is None
     with pytest.raises(ValueError, match="1 heights for 2 places"):
         show_points([1, 3], [0.5], "x", "y", "t")
+
+
+def test_maps_of_blank_and_of_thin_pictures_are_drawn():
+    show_distances(
+        [torch.full((20, 20), torch.inf), torch.arange(20.0).view(1, 20)], ["blank", "thin"]
+    ).canvas.draw()
+    with pytest.raises(ValueError, match="found no maps"):
+        show_distances([], [])

@@ -8,6 +8,7 @@ from jaxtyping import Bool
 from torch import Tensor
 
 from ..interpreters.csg import OPERATIONS, Picture, Program, ProgramError, execute, parse, vocabulary_of
+from ..interpreters.csg.vocabulary import WORDS
 from ..metrics.images import iou
 from . import OK, UNANSWERED, hint
 
@@ -16,7 +17,6 @@ ALIKE = 0.95  # intersection over union of exercise 8.4
 LONGEST = 13  # tokens that a network may write
 LONG_WINDED = "c(24,32,20)c(24,32,12)+s(40,40,16)+s(40,40,16)c(40,40,8)+c(48,48,8)s(40,40,16)*+-"
 _HOUSE = "s(32,40,24)t(32,24,24)+s(32,48,12)-c(32,24,8)-"
-_GRID = "centers are 8, 16, … 56, sizes 8, 12, … 32, and nothing may stick out of the canvas"
 _WRITTEN = {"primitive": ("c(32,32,16)", "s(24,40,12)", "t(32,24,20)"), "operation": tuple(OPERATIONS)}
 
 
@@ -45,13 +45,13 @@ def _compared(answer: Callable) -> str:
             tokens = [pick.choice(_WRITTEN[role]) for role in pattern]
             try:
                 found = answer(list(tokens))
-                yes = bool(found)
-            except Exception as error:  # whatever is wrong with a reader's function, it becomes a hint
-                return hint(f"for {tokens} it raises {type(error).__name__} ({str(error)[:80]})")
+                yes, shown = bool(found), repr(found)[:80]
+            except (Exception, SystemExit) as error:  # what is wrong with a reader's function becomes a hint
+                return hint(f"for {tokens} it raises {type(error).__name__}")
             if found is None and length == 1 and _is_program(tokens):
                 return UNANSWERED
             if yes != _is_program(tokens):
-                return hint(f"for {tokens} it says {found}")
+                return hint(f"for {tokens} it says {shown}")
     return OK
 
 
@@ -113,7 +113,7 @@ def _picture(answer: object, tokens: int | None = None) -> Picture | str:
         return hint(str(error))
     for primitive in program.primitives:
         if primitive not in vocabulary_of(2).primitives:
-            return hint(f"{primitive} is not among the 400 tokens: {_GRID}")
+            return hint(f"{primitive} is not among the 400 tokens: {WORDS}")
     if tokens is not None and len(program) != tokens:
         return hint(f"it has {len(program)} token{'s' * (len(program) != 1)}, write {tokens}")
     return execute(program)

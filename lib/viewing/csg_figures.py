@@ -23,20 +23,23 @@ def show_distances(
     """
     if len(titles) != len(maps) or (marks is not None and len(marks) != len(maps)):
         raise ValueError(f"{len(maps)} maps need as many titles, and as many marks or none")
+    if not len(maps):
+        raise ValueError("found no maps; expected one or more")
     grids = [np.asarray(each, dtype=float) for each in maps]
     figure, axes = plt.subplots(
         1, len(grids), figsize=(size * len(grids), size + 0.3), dpi=100, squeeze=False
     )
     plt.close(figure)
-    farthest = max(grid.max() for grid in grids)
+    farthest = max(
+        grid[np.isfinite(grid)].max(initial=0) for grid in grids
+    )  # without an outline all is infinite
     for ax, grid, title in zip(axes[0], grids, titles):
-        ax.imshow(
-            grid, cmap="Blues", vmin=0, vmax=1.6 * farthest
-        )  # 1.6: numbers stay readable on the darkest
+        # 1.6: numbers stay readable on the darkest
+        ax.imshow(np.where(np.isfinite(grid), grid, np.nan), cmap="Blues", vmin=0, vmax=1.6 * farthest)
         if max(grid.shape) <= NUMBERED:
             for (y, x), distance in np.ndenumerate(grid):
                 ax.text(x, y, f"{distance:.1f}", ha="center", va="center", fontsize=7.5)
-        elif farthest > RINGS:
+        elif farthest > RINGS and min(grid.shape) > 1:
             lines = ax.contour(grid, np.arange(RINGS, farthest, RINGS), colors="#24344d", linewidths=0.8)
             ax.clabel(lines, fmt="%g", fontsize=6.5)
         ax.set(xticks=[], yticks=[])

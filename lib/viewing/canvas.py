@@ -105,7 +105,7 @@ def write(ax: Axes, text: str, x: float, y: float, size: float = 9, code: bool =
     """Text below the point (x, y), in the middle; code in the type of code."""
     family = "monospace" if code else None
     style = {"ha": "center", "va": "top", "color": "#1b1f27", "linespacing": 1.15, **style}
-    ax.text(x, y, text, fontsize=size, family=family, **style)
+    ax.text(x, y, text, fontsize=size, family=family, parse_math=False, **style)  # $ is a token, not TeX
 
 
 def show_pictures(
@@ -258,4 +258,6 @@ def _outline(ax: Axes, primitive: Primitive, cut: bool, x: float, y: float) -> N
 def _legend(ax: Axes, keys: list, x: float, y: float) -> None:
     style = {"ncols": len(keys), "fontsize": 8, "frameon": False, "handlelength": 1.2, "columnspacing": 0.9}
     place = {"loc": "upper center", "bbox_to_anchor": (x, y), "bbox_transform": ax.transData}
-    ax.legend(handles=keys, borderpad=0, borderaxespad=0, handletextpad=0.4, **style, **place)
+    legend = ax.legend(handles=keys, borderpad=0, borderaxespad=0, handletextpad=0.4, **style, **place)
+    for text in legend.get_texts():
+        text.set_parse_math(False)

@@ -26,6 +26,7 @@ from lib.interpreters.csg import (
     trace,
     vocabulary_of,
 )  # fmt: skip
+from lib.interpreters.csg.geometry import whole
 from lib.interpreters.csg.primitives import draw
 from lib.interpreters.csg.program import STOP, Operation, Statement
 from lib.interpreters.csg.tracing import missing, parse_start
@@ -36,7 +37,9 @@ from lib.viewing.running import MEANING, show_stack
 
 JS = Path(__file__).parent / "js"
 CONTEXT = 36  # letters of a long text shown before and after the place of an error
-ACTIONS = ("push", "undo", "redo", "clear", "load", "look")  # what the browser may ask for
+# What the browser may ask for, and how many values may come with it.
+ACTIONS = {"push": (1,), "undo": (0,), "redo": (0,), "clear": (0,), "load": (1,), "look": (0, 1)}
+TOKEN = "a primitive such as c(32,32,8), or + * -"  # what can be pushed
 
 
 class Playground(anywidget.AnyWidget):
@@ -101,9 +104,11 @@ class Playground(anywidget.AnyWidget):
 
     def push(self, token: str) -> None:
         """Add a token: one of the networks' primitives such as "c(32,32,8)", or + * -. Else raises ProgramError."""
+        if not isinstance(token, str):
+            raise ProgramError(f"the token is a {type(token).__name__}", expected=TOKEN)
         if token == STOP:
             found = f"'{STOP}' ends what a network writes; here a program ends with its last token"
-            raise ProgramError(found, expected="a primitive such as c(32,32,8), or + * -")
+            raise ProgramError(found, expected=TOKEN)
         statements = parse_start(token) if token not in OPERATIONS else (Operation(token),)
         if len(statements) != 1:
             raise ProgramError(f"{len(statements)} tokens in {quoted(token)}", expected="one")
@@ -130,9 +135,12 @@ class Playground(anywidget.AnyWidget):
 
     def look(self, place: int | None = None) -> None:
         """Show the stack as it was after the token at a place, counted from 0; after the last one if left out."""
-        if place is not None and place not in range(len(self._steps)):
-            raise ProgramError(f"there is no token {place}", expected=f"0 to {len(self._steps) - 1}")
-        self._show(len(self._steps) - 1 if place is None else place)
+        last = len(self._steps) - 1
+        shown = last if place is None else whole(place)
+        if place is not None and shown not in range(last + 1):
+            some = f"a place from 0 to {last}" if self._steps else "no place: the program is empty"
+            raise ProgramError(f"there is no token {place!r:.40}", expected=some)
+        self._show(shown)
 
     def figure(self) -> Figure:
         """The stack after each token as a still picture, for pages without a kernel."""
@@ -204,13 +212,30 @@ class Playground(anywidget.AnyWidget):
 
     def _on_message(self, _, message: dict, buffers: Sequence[bytes] = ()) -> None:
         """What the browser asks for. Whatever is wrong with it is said on the page."""
-        action, arguments = message.get("do"), message.get("with", [])
+        action, values = _asked(message)
         if action not in ACTIONS:
             return
         try:
-            getattr(self, action)(*arguments)
+            _check_values(action, values)
+            getattr(self, action)(*values)
         except ProgramError as error:
-            self._show(self._shown, error, arguments[0] if action == "load" else None)
+            self._show(self._shown, error, values[0] if action == "load" and error.column else None)
+
+
+def _asked(message) -> tuple[str, object]:
+    """What a message asks for, "" where it does not say so, and the values that come with it."""
+    asked = message if isinstance(message, dict) else {}
+    action = asked.get("do")
+    return action if isinstance(action, str) else "", asked.get("with", [])
+
+
+def _check_values(action: str, values) -> None:
+    """Raises ProgramError unless as many values come with an action as it takes."""
+    if not isinstance(values, (list, tuple)):
+        raise ProgramError(f"{action} came with a {type(values).__name__}", expected="a list of values")
+    if len(values) not in ACTIONS[action]:
+        expected = " or ".join(map(str, ACTIONS[action]))
+        raise ProgramError(f"{action} came with {len(values)} values", expected=expected)
 
 
 def _written(text: str | Program) -> tuple[Statement, ...]:

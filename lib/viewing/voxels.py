@@ -25,9 +25,7 @@ def voxel_mesh(solid) -> trimesh.Trimesh:
 
     solid: a Solid, a program of space or its text, or a grid[x, y, z] of booleans.
     """
-    solid = _executed(solid)
-    grid = solid.grid if isinstance(solid, Solid) else solid
-    grid = np.pad(grid.cpu().numpy() if isinstance(grid, Tensor) else np.asarray(grid, dtype=bool), 1)
+    grid = np.pad(_grid_of(solid), 1)
     corners = []  # (n, 4, 3) of each of the six directions
     for axis in range(3):
         across = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
@@ -60,7 +58,17 @@ def show_solids(
     if len(exact) != len(solids):
         raise ValueError(f"{len(exact)} answers to exact for {len(solids)} solids: one for all, or one each")
     meshes = [(exact_mesh if fine else voxel_mesh)(solid) for solid, fine in zip(solids, exact)]
-    return show(meshes, titles, **{"camera": Camera(bounds=bounds_of(*meshes), **VIEW), **options})
+    figure = show(meshes, titles, **{"camera": Camera(bounds=bounds_of(*meshes), **VIEW), **options})
+    for ax in figure.axes:
+        ax.xaxis.label.set_parse_math(False)  # $ is a token, not TeX
+    return figure
+
+
+def _grid_of(solid) -> np.ndarray:
+    """The voxels as booleans, [x, y, z], of whatever is in space; what is not 0 is ON."""
+    solid = _executed(solid)
+    grid = solid.grid if isinstance(solid, Solid) else solid
+    return grid.detach().bool().cpu().numpy() if isinstance(grid, Tensor) else grid.astype(bool)
 
 
 def _executed(solid) -> Solid | Tensor | np.ndarray:

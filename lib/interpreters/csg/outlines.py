@@ -15,12 +15,13 @@ import torch
 from jaxtyping import Float
 from manifold3d import CrossSection, Manifold
 
-from .geometry import fold, inside, trapezoid
+from .geometry import fold, inside, trapezoid, whole
 from .packing import SIDE
 from .primitives import Primitive
 from .program import Program
 
 MOST_SEGMENTS = 1024  # corners of a full circle: a sphere of so many has half a million triangles
+LOWEST, HIGHEST = 1e-6, 1e6  # pixels: plates beyond would lose their corners to rounding
 DUST = 1e-6  # square pixels: smaller rings are left over from rounding
 _AT_ONCE = 1 << 20  # places between borders that `area` looks at in one step
 _COLOR = re.compile(r"#?[A-Za-z0-9]+|[a-z]+\([0-9., %]*\)")
@@ -41,16 +42,17 @@ def rings(program: Program, segments: int) -> Rings:
 
 def section(program: Program, segments: int) -> CrossSection:
     """The shape in the plane as Clipper2 holds it."""
-    check_segments(segments)
+    segments = check_segments(segments)
     operations = {"+": operator.add, "*": operator.xor, "-": operator.sub}
     return fold(program, lambda primitive: _polygon(primitive, segments), operations)
 
 
-def check_segments(segments: int) -> None:
-    """Raises ValueError for what cannot be the number of corners of a circle."""
-    whole = isinstance(segments, int) and not isinstance(segments, bool)
-    if not whole or segments % 4 or not 4 <= segments <= MOST_SEGMENTS:
+def check_segments(segments: int) -> int:
+    """The number of corners of a circle as an int. Raises ValueError for what cannot be one."""
+    number = whole(segments)
+    if number is None or number % 4 or not 4 <= number <= MOST_SEGMENTS:
         raise ValueError(f"found {segments} segments; expected a multiple of 4 from 4 to {MOST_SEGMENTS}")
+    return number
 
 
 def swollen(segments: int) -> float:
@@ -79,8 +81,8 @@ def plate(program: Program, height: float, segments: int) -> Manifold:
 
     The picture's row y lies at 63 - y.
     """
-    if not 0 < height < math.inf:
-        raise ValueError(f"found a height of {height}; expected more than 0 pixels")
+    if not LOWEST <= height <= HIGHEST:
+        raise ValueError(f"found a height of {height}; expected {LOWEST:g} to {HIGHEST:g} pixels")
     upright = [ring[::-1] * (1, -1) + (0, SIDE - 1) for ring in rings(program, segments)]
     return CrossSection(upright).extrude(height) if upright else Manifold()
 

@@ -26,11 +26,13 @@ from torch import Tensor
 
 from ..threads import one_thread
 from .errors import ProgramError
-from .program import LONGEST, Program
+from .geometry import whole
+from .program import Program
 from .vocabulary import vocabulary_of
 
 LENGTHS = {2: (3, 5, 7, 9, 11, 13), 3: (3, 5, 7)}  # tokens, by dimension; the paper's Table 1
 SMALLEST = {2: 12, 3: 7}  # pixels along a side of the vocabulary's smallest square and cube, by dimension
+LONGEST_SAMPLED = 51  # tokens: far more than the paper's, in seconds; twice as many would take half a minute
 UNION, INTERSECT, SUBTRACT = range(3)  # operations as they follow the primitives in a vocabulary
 _FEWEST = 128  # programs grown together: among fewer, partners are rare
 _MOST = {2: 4096, 3: 2048}  # programs grown together, by dimension: what fits the memory of a small laptop
@@ -97,10 +99,7 @@ def sample_many(
     from .growing import grow
 
     _check_generator(rng)
-    if number < 0:
-        raise ProgramError(f"{number} programs", expected="a whole number, at least 0")
-    if length < 1 or length % 2 == 0 or length > LONGEST:
-        raise ProgramError(f"programs of {length} tokens", expected=f"an odd number from 1 to {LONGEST}")
+    number, length = _check_number(number), _check_length(length)
     vocabulary = vocabulary_of(dimensions)
     quotas = _quotas(rng, number) if rules.balanced and length > 1 else None
     found, before, barren = torch.empty((0, length), dtype=torch.int64), -1, 0
@@ -122,6 +121,21 @@ def _check_generator(rng) -> None:
     if not isinstance(rng, np.random.Generator):
         expected = "a numpy Generator, such as np.random.default_rng(0)"
         raise ProgramError(f"found {rng!r:.40}", expected=expected)
+
+
+def _check_number(given) -> int:
+    number = whole(given)
+    if number is None or number < 0:
+        raise ProgramError(f"{given!r:.40} programs", expected="a whole number, at least 0")
+    return number
+
+
+def _check_length(given) -> int:
+    length = whole(given)
+    if length is None or length % 2 == 0 or not 1 <= length <= LONGEST_SAMPLED:
+        expected = f"an odd number from 1 to {LONGEST_SAMPLED}: longer ones take minutes to sample"
+        raise ProgramError(f"programs of {given!r:.40} tokens", expected=expected)
+    return length
 
 
 def _quotas(rng: np.random.Generator, number: int) -> list[int]:

@@ -66,7 +66,7 @@ class Picture(Shape):
 
     @cached_property
     def image(self) -> Bool[Tensor, "64 64"]:
-        """The pixels, [row y, column x]."""
+        """The pixels, [row y, column x]. Shared: do not change it."""
         return unpack(self.words)
 
     @cached_property
@@ -95,11 +95,12 @@ class Picture(Shape):
         """A trimesh.Trimesh: the picture cut out of a plate, watertight; without faces if there is nothing inside.
 
         x, 63 - y and z from 0 to `height` pixels: from above, where z points, it looks like the picture.
+        height: from 1e-6 to 1e6. Raises ValueError.
         """
         from .outlines import plate
-        from .solids import triangles
+        from .solids import DUST, triangles
 
-        return triangles(plate(self.program, height, segments))
+        return triangles(plate(self.program, height, segments), DUST * min(1, height))
 
     def to_svg(self, color: str = "#5e8bba") -> str:
         """The outline as an SVG file that shows the canvas. Raises ProgramError for a shape without an inside."""
@@ -119,7 +120,7 @@ class Solid(Shape):
 
     @cached_property
     def grid(self) -> Bool[Tensor, "64 64 64"]:
-        """The voxels, [x, y, z]."""
+        """The voxels, [x, y, z]. Shared: do not change it."""
         return unpack(self.words).view(SIDE, SIDE, SIDE)
 
     def mesh(self, segments: int = 64):
@@ -152,9 +153,10 @@ def _with_inside(made):
 
 
 def _drawn(points_on, surface, n: int, seed: int) -> Float[Tensor, "n d"]:
-    if n < 0:
+    number = geometry.whole(n)
+    if number is None or number < 0:
         raise ValueError(f"found {n} points; expected a whole number, at least 0")
-    return torch.from_numpy(points_on(_with_inside(surface), n, seed)).float()
+    return torch.from_numpy(points_on(_with_inside(surface), number, seed)).float()
 
 
 class Shapes(Sequence):

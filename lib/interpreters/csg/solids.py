@@ -27,7 +27,7 @@ _Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # x
 
 def solid(program: Program, segments: int) -> Manifold:
     """The shape in space as manifold3d holds it."""
-    check_segments(segments)
+    segments = check_segments(segments)
     operations = {"+": operator.add, "*": operator.xor, "-": operator.sub}
     return fold(program, lambda primitive: _polyhedron(primitive, segments), operations)
 
@@ -49,12 +49,15 @@ def _ball(segments: int) -> Manifold:
     return inscribed.scale(((4 / 3 * math.pi / inscribed.volume()) ** (1 / 3),) * 3)
 
 
-def triangles(made: Manifold) -> trimesh.Trimesh:
-    """The surface; without a triangle for an empty shape. Corners that touch stay apart where the surface needs it."""
+def triangles(made: Manifold, dust: float = DUST) -> trimesh.Trimesh:
+    """The surface; without a triangle for an empty shape. Corners that touch stay apart where the surface needs it.
+
+    Bodies that have no more volume than `dust` are left out.
+    """
     mesh = made.to_mesh64()
     corners, faces = mesh.vert_properties[:, :3], mesh.tri_verts.astype(np.int64)
     if len(faces):
-        faces = faces[_is_kept(corners, faces)]
+        faces = faces[_is_kept(corners, faces, dust)]
     if not len(faces):
         return trimesh.Trimesh()
     surface = trimesh.Trimesh(corners, faces, process=False)
@@ -63,13 +66,13 @@ def triangles(made: Manifold) -> trimesh.Trimesh:
 
 
 def _is_kept(
-    corners: Float[np.ndarray, "corners 3"], faces: Int[np.ndarray, "faces 3"]
+    corners: Float[np.ndarray, "corners 3"], faces: Int[np.ndarray, "faces 3"], dust: float
 ) -> Bool[np.ndarray, " faces"]:
     """Does each face belong to a body or a cavity that is larger than dust?"""
     edges = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
     body = trimesh.graph.connected_component_labels(edges, len(corners))[faces[:, 0]]
     volume = np.bincount(body, np.linalg.det(corners[faces]) / 6)
-    return np.abs(volume[body]) > DUST
+    return np.abs(volume[body]) > dust
 
 
 def points_on(mesh: trimesh.Trimesh, n: int, seed: int) -> Float[np.ndarray, "n 3"]:

@@ -138,7 +138,7 @@ def test_programs_that_are_not_valid_are_told(written, data, tmp_path, capsys):
     written["val_3"][0] = 396
     make_csg_programs.write(data / "programs_2d.npz", written)
     assert measure_csg_programs.main(["--dimensions", "2", "--out", str(tmp_path / "result.json")]) == 1
-    assert "programs of 3 tokens that are not valid" in capsys.readouterr().err
+    assert "val_3 has rows that are no programs" in capsys.readouterr().err
 
 
 def test_wrong_use(capsys):

@@ -95,7 +95,7 @@ def choose(
 
 
 def draw(found: dict[int, np.ndarray], dimensions: int, bar: tqdm) -> tuple[np.ndarray, np.ndarray]:
-    """(a hash of each program's picture, how many of its pixels are ON). Raises DataError for what is no program.
+    """(a hash of each program's picture, how many of its pixels are ON).
 
     Hashes have 64 bits: that any two of n different pictures have the same has odds of n^2 / 2^65, for the plane's
     1,675,000 one in 13 million.

@@ -71,14 +71,17 @@ class Parts:
         write_whole(made, text.encode())
 
     def path(self, chunk: Chunk) -> Path:
+        """Where a chunk is, or will be."""
         return self.folder / f"{chunk[1]:02d}-{chunk[2]:05d}.npy"
 
     def keep(self, chunk: Chunk, tokens: np.ndarray) -> None:
+        """Write a finished chunk's tokens (programs, length)."""
         file = io.BytesIO()
         np.save(file, tokens)
         write_whole(self.path(chunk), file.getvalue())
 
     def read(self, chunk: Chunk) -> np.ndarray:
+        """The tokens of a finished chunk. Raises DataError for a file that is damaged."""
         path = self.path(chunk)
         try:
             tokens = np.lib.format.read_array(io.BytesIO(path.read_bytes()))  # unpickles nothing

@@ -31,10 +31,8 @@ from data_scripts.parallel import in_parallel
 from lib.datasets import CSG_SIZES, CSG_SPLITS, DataError, data_root
 from lib.interpreters.csg import vocabulary_of
 
-CHUNK = {
-    2: 8192,
-    3: 4096,
-}  # programs a worker makes at once, by dimension; fixed, because it decides what comes out
+# Programs a worker makes at once, by dimension; fixed, because it decides what comes out.
+CHUNK = {2: 8192, 3: 4096}
 _SPARE = 1.02  # as many more are made at first than are needed, for what turns out to be there already
 _OUT = (
     "default: %(default)s; lib.datasets looks for a folder csg/ in data/, or in the folder that the environment "

@@ -28,14 +28,8 @@ PACKAGE = Package(
     client=("apt-get", "download", "sweethome3d-furniture=1.8-1"),
 )
 CATALOGUE = "PluginFurnitureCatalog.properties"
-ROOMS = {
-    "Living room",
-    "Bedroom",
-    "Office",
-    "Kitchen",
-    "Exterior",
-    "Lights",
-}  # elsewhere: cars, sports, animals
+# Categories of the catalogue in which furniture is looked for; elsewhere: cars, sports, animals.
+ROOMS = {"Living room", "Bedroom", "Office", "Kitchen", "Exterior", "Lights"}
 WORDS = [  # what a name says it is; the first that fits counts ("Desk lamp" is a lamp, "Desk table" a desk)
     ("", r"fan|freezer|flashlight|candle"),
     ("lamp", r"lamps?|lights?|lamppost|(?:wall )?spotlight|lantern|chandelier|fluorescent strip"),

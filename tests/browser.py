@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = {  # the Lab asks nobody for news, and draws every cell, also those that are scrolled away
     "@jupyterlab/apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
@@ -29,6 +31,17 @@ def find_chromium() -> str | None:
     """The path of a Chromium or Chrome: the environment variable CHROMIUM, or the first one installed."""
     names = (os.environ.get("CHROMIUM"), "chromium", "chromium-browser", "google-chrome")
     return next((path for name in names if name and (path := shutil.which(name))), None)
+
+
+def playwright_and_chromium() -> tuple:
+    """Playwright's sync_api and the path of a Chromium; skips the test where either is missing."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    chromium = find_chromium()
+    if chromium is None:
+        pytest.skip(
+            "no Chromium found: install one (Debian: apt install chromium) or set CHROMIUM to its path"
+        )
+    return sync_api, chromium
 
 
 @contextmanager

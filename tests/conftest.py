@@ -40,6 +40,20 @@ def read_programs(archive: Path) -> dict[str, dict[str, str]]:
 
 
 @pytest.fixture(scope="session")
+def recorded(shared):
+    """recorded("csg_2d"): arrays that the authors' programs gave, of one file. Skipped where it is not at hand."""
+
+    def load(name: str) -> dict[str, np.ndarray]:
+        path = shared / "goldens" / f"{name}.npz"
+        if not path.is_file():
+            pytest.skip(f"no {path}; SHAPE_PROGRAMS_SHARED can name another folder with reference data")
+        with np.load(path) as arrays:
+            return dict(arrays)
+
+    return load
+
+
+@pytest.fixture(scope="session")
 def sampled() -> list:
     """Sixty random programs with all five statements and up to three levels."""
     from lib.interpreters.shapeassembly import sample

@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from tests.browser import CHROMIUM_FLAGS, ROOT, find_chromium, jupyterlab
+from tests.browser import CHROMIUM_FLAGS, ROOT, jupyterlab, playwright_and_chromium
 
 NOTEBOOK = "01_shapeassembly_language.ipynb"
 PATIENCE = 90_000  # milliseconds for a step that takes about 5 s here: slow machines are allowed
@@ -33,12 +33,7 @@ pytestmark = pytest.mark.browser
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     """Notebook 01 after all its cells have run. `page.problems` collects errors of the console and of the page."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = find_chromium()
-    if chromium is None:
-        pytest.skip(
-            "no Chromium found: install one (Debian: apt install chromium) or set CHROMIUM to its path"
-        )
+    sync_api, chromium = playwright_and_chromium()
     if not (ROOT / "notebooks" / NOTEBOOK).exists():
         pytest.skip(f"notebooks/{NOTEBOOK} does not exist")
     with (

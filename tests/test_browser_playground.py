@@ -6,7 +6,7 @@ from statistics import median
 import pytest
 
 from lib.interpreters.csg import execute, parse
-from tests.browser import CHROMIUM_FLAGS, ROOT, find_chromium, jupyterlab
+from tests.browser import CHROMIUM_FLAGS, ROOT, jupyterlab, playwright_and_chromium
 from tests.test_browser import KERNEL_IDLE, PATIENCE, START_ALL_CELLS, listen
 
 pytestmark = pytest.mark.browser
@@ -34,12 +34,7 @@ ON = """(canvas) => {
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     """A notebook with two playgrounds, the second one with a target, after its cells have run."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = find_chromium()
-    if chromium is None:
-        pytest.skip(
-            "no Chromium found: install one (Debian: apt install chromium) or set CHROMIUM to its path"
-        )
+    sync_api, chromium = playwright_and_chromium()
     folder = tmp_path_factory.mktemp("notebooks")
     (folder / "play.ipynb").write_text(json.dumps(notebook(CELLS)))
     with (

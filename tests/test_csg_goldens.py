@@ -11,17 +11,9 @@ from lib.interpreters.csg import Program, ProgramError, execute_many, parse, voc
 
 
 @pytest.fixture(scope="module")
-def golden(shared):
+def golden(recorded):
     """golden("2d"): the arrays recorded."""
-
-    def load(name: str) -> dict[str, np.ndarray]:
-        path = shared / "goldens" / f"csg_{name}.npz"
-        if not path.is_file():
-            pytest.skip(f"no {path}; SHAPE_PROGRAMS_SHARED can name another folder with reference data")
-        with np.load(path) as arrays:
-            return dict(arrays)
-
-    return load
+    return lambda name: recorded(f"csg_{name}")
 
 
 def unpacked(bits: np.ndarray, dimensions: int) -> np.ndarray:

@@ -16,17 +16,9 @@ REAL_COUNT = {"chair": 3835, "table": 6536, "storage": 1551}
 
 
 @pytest.fixture(scope="module")
-def golden(shared):
+def golden(recorded):
     """golden("chair"): the arrays recorded for a set of programs."""
-
-    def load(name: str) -> dict[str, np.ndarray]:
-        path = shared / "goldens" / f"shapeassembly_{name}.npz"
-        if not path.is_file():
-            pytest.skip(f"no {path}; SHAPE_PROGRAMS_SHARED can name another folder with reference data")
-        with np.load(path) as arrays:
-            return dict(arrays)
-
-    return load
+    return lambda name: recorded(f"shapeassembly_{name}")
 
 
 def largest_differences(shapes: Shapes, recorded: dict[str, np.ndarray]) -> np.ndarray:

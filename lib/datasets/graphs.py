@@ -7,11 +7,8 @@ from lib.furniture import make
 from .base import CATEGORIES, DataError, DataSet, data_root
 
 FURNITURE = 1000  # part graphs a category; the maker has no end of them
-PARTNET = {
-    "chair": "chair_hier",
-    "table": "table_hier",
-    "storage": "storagefurniture_hier",
-}  # StructureNet's folders
+# StructureNet's folders.
+PARTNET = {"chair": "chair_hier", "table": "table_hier", "storage": "storagefurniture_hier"}
 
 
 class GraphSet(DataSet):

@@ -45,9 +45,8 @@ def placed(points: Float[np.ndarray, "t 3 2"]) -> Float[np.ndarray, "t 3 2"]:
     """(right, up) in world units -> (column, row) in samples, of a scale and at a place that fills the image."""
     low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
     extent = (high - low).max()
-    centred = (points - (low + high) / 2) / (
-        extent or 1
-    )  # a line seen along itself is a point, and stays one
+    # A line seen along itself is a point, and stays one.
+    centred = (points - (low + high) / 2) / (extent or 1)
     return centred * (FILL * SAMPLES) * (1, -1) + SIZE * SAMPLES / 2
 
 

@@ -30,9 +30,8 @@ def show_distances(
         1, len(grids), figsize=(size * len(grids), size + 0.3), dpi=100, squeeze=False
     )
     plt.close(figure)
-    farthest = max(
-        grid[np.isfinite(grid)].max(initial=0) for grid in grids
-    )  # without an outline all is infinite
+    # Where there is no outline, all distances are infinite.
+    farthest = max(grid[np.isfinite(grid)].max(initial=0) for grid in grids)
     for ax, grid, title in zip(axes[0], grids, titles):
         # 1.6: numbers stay readable on the darkest
         ax.imshow(np.where(np.isfinite(grid), grid, np.nan), cmap="Blues", vmin=0, vmax=1.6 * farthest)

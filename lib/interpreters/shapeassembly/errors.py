@@ -1,24 +1,7 @@
 """The one exception of the ShapeAssembly language."""
 
+from ..line_errors import LineError
 
-class ProgramError(ValueError):
-    """A program that cannot be read or run.
 
-    line, column  1-based place in the text (None where no single place is to blame)
-    token         what was found there
-    expected      what should have stood there
-    """
-
-    def __init__(
-        self,
-        message: str,
-        line: int | None = None,
-        column: int | None = None,
-        token: str = "",
-        expected: str = "",
-    ):
-        self.line, self.column, self.token, self.expected = line, column, token, expected
-        place = f"line {line}" if line else ""
-        place += f", column {column}" if line and column else ""
-        wanted = f"; expected {expected}" if expected else ""
-        super().__init__(f"{place}: {message}{wanted}" if place else f"{message}{wanted}")
+class ProgramError(LineError):
+    """A ShapeAssembly program that cannot be read or run: see LineError for what it tells."""

@@ -1,0 +1,277 @@
+"""The primitives: a kind, its sizes, and a pose. One object may hold a whole batch of one kind.
+
+    in space      Box(half)   Sphere(radius)   Cylinder(radius, height)   Cone(slope, height)
+    in the plane  Square(half)   Circle(radius)   Triangle(left, right, height)   HalfPlane()
+
+Each also takes translation= and rotation= (see `poses`). A cylinder lies around its z axis, its middle at the
+translation; a cone's apex is at the translation and it opens to +z, slope = radius / height. Without a height both go
+on for ever, as the paper's do. Sizes count without their sign (`distances` has the formulas).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from . import distances as formulas
+from .errors import ProgramError
+from .poses import ANGLES, matrices, unturned
+
+Numbers = Tensor | Sequence[float] | float | None
+POSE = ("translation", "rotation")
+
+
+@dataclass(frozen=True, eq=False)
+class Primitive:
+    """What all kinds share. Every field is a tensor: (*n) or, for `half` and the pose, (*n, numbers); numbers that are
+    no tensors become float64. Leading dimensions *n make a batch."""
+
+    name: ClassVar[str] = ""  # as written in a program
+    dimensions: ClassVar[int] = 3
+    counts: ClassVar[dict[str, int]] = {}  # numbers of each size; 1: a scalar
+
+    def __post_init__(self):
+        given = {key: _tensor(getattr(self, key)) for key in self._given()}
+        like = next(iter(given.values()), torch.zeros((), dtype=torch.float64))
+        batch = like.shape[:-1] if self.widths.get(next(iter(given), ""), 1) > 1 else like.shape
+        defaults = {"translation": [0.0] * self.dimensions, "rotation": unturned(self.dimensions)}
+        for key, numbers in defaults.items():
+            given.setdefault(key, like.new_tensor(numbers).expand(*batch, len(numbers)))
+        for key, value in given.items():
+            width = self.widths[key]
+            if width > 1 and value.shape[-1:] != (width,):
+                raise ProgramError(
+                    f"{key} of a {self.name} has the shape {tuple(value.shape)}", expected=f"{width} numbers"
+                )
+            if key == "rotation" and width == 1 and value.shape == batch:
+                value = value.unsqueeze(-1)  # in the plane one may write rotation=0.5
+            object.__setattr__(self, key, value)
+
+    def _given(self) -> list[str]:
+        return [field.name for field in fields(self) if getattr(self, field.name) is not None]
+
+    @property
+    def widths(self) -> dict[str, int]:
+        """Numbers of each field, as written: sizes, translation, rotation."""
+        return {**self.counts, "translation": self.dimensions, "rotation": ANGLES[self.dimensions]}
+
+    @property
+    def written(self) -> list[str]:
+        """Names of the fields that have numbers (no height: none), in text order."""
+        return [key for key in self.widths if getattr(self, key) is not None]
+
+    @property
+    def form(self) -> tuple:
+        """Primitives of equal form can be stacked into one batch."""
+        return type(self), len(self.written)
+
+    @property
+    def sizes(self) -> Float[Tensor, "*n s"]:
+        """The sizes side by side."""
+        sizes = [self._wide(key) for key in self.written if key not in POSE]
+        return torch.cat(sizes, -1) if sizes else self.translation[..., :0]
+
+    @property
+    def numbers(self) -> Float[Tensor, "*n k"]:
+        """All numbers in text order: sizes, translation, rotation."""
+        return torch.cat([self._wide(key) for key in self.written], -1)
+
+    def _wide(self, key: str) -> Float[Tensor, "*n k"]:
+        value = getattr(self, key)
+        return value.unsqueeze(-1) if self.widths[key] == 1 and key != "rotation" else value
+
+    def with_numbers(self, numbers: Float[Tensor, "*n k"]) -> "Primitive":
+        """The same kind with other numbers, in text order."""
+        widths = [self.widths[key] for key in self.written]
+        parts = dict(zip(self.written, numbers.split(widths, -1)))
+        scalars = {
+            key: parts[key].squeeze(-1) for key in self.counts if key in parts and self.widths[key] == 1
+        }
+        return type(self)(**(parts | scalars))
+
+    @classmethod
+    def from_paper(cls, numbers: Float[Tensor, "*n k"]) -> "Primitive":
+        """From the order of the paper's program: rotation, translation, sizes. Sizes that are left out are None."""
+        angles, place = ANGLES[cls.dimensions], ANGLES[cls.dimensions] + cls.dimensions
+        given, start = {"rotation": numbers[..., :angles], "translation": numbers[..., angles:place]}, place
+        for key, width in cls.counts.items():
+            if start + width <= numbers.shape[-1]:
+                given[key] = numbers[..., start] if width == 1 else numbers[..., start : start + width]
+            start += width
+        return cls(**given)
+
+    def to(self, *args) -> "Primitive":
+        """The same with another dtype or on another device, as `Tensor.to`."""
+        return type(self)(**{key: getattr(self, key).to(*args) for key in self.written})
+
+    def __getitem__(self, rows) -> "Primitive":
+        """Some of a batch."""
+        return type(self)(**{key: getattr(self, key)[rows] for key in self.written})
+
+    def local(self, points: Float[Tensor, "*#n m d"]) -> Float[Tensor, "*n m d"]:
+        """World points in the primitive's own coordinates."""
+        return (points.to(self.translation) - self.translation.unsqueeze(-2)) @ matrices(self.rotation).mT
+
+    def distance(self, points: Float[Tensor, "*#n m d"]) -> Float[Tensor, "*n m"]:
+        """Signed distance of m points to each primitive: negative inside. Differentiable."""
+        return self._formula()(self.local(points), self.sizes)
+
+    def _formula(self) -> Callable[[Tensor, Tensor], Tensor]:
+        raise NotImplementedError
+
+    def __eq__(self, other) -> bool:
+        """The same kind with the same numbers."""
+        if not isinstance(other, Primitive) or self.form != other.form:
+            return False
+        return self.translation.shape == other.translation.shape and bool(
+            (self.numbers.double() == other.numbers.double()).all()
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.form, tuple(self.numbers.flatten().tolist())))
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Primitive):
+    """A box with its center at the translation; half: half of its sides along x, y, z."""
+
+    half: Numbers
+    translation: Numbers = None
+    rotation: Numbers = None
+    name = "box"
+    counts = {"half": 3}
+
+    def _formula(self):
+        return formulas.box
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Primitive):
+    radius: Numbers
+    translation: Numbers = None
+    rotation: Numbers = None
+    name = "sphere"
+    counts = {"radius": 1}
+
+    def _formula(self):
+        return formulas.sphere
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(Primitive):
+    """Around its z axis; with a height from z = -height/2 to height/2, else for ever."""
+
+    radius: Numbers
+    height: Numbers = None
+    translation: Numbers = None
+    rotation: Numbers = None
+    name = "cylinder"
+    counts = {"radius": 1, "height": 1}
+
+    def _formula(self):
+        return formulas.cylinder if self.height is None else formulas.capped_cylinder
+
+
+@dataclass(frozen=True, eq=False)
+class Cone(Primitive):
+    """Its apex at the translation, opening to +z; slope: radius over height; with a height it ends there."""
+
+    slope: Numbers
+    height: Numbers = None
+    translation: Numbers = None
+    rotation: Numbers = None
+    name = "cone"
+    counts = {"slope": 1, "height": 1}
+
+    def _formula(self):
+        return formulas.cone if self.height is None else formulas.capped_cone
+
+
+@dataclass(frozen=True, eq=False)
+class Square(Primitive):
+    """A square, or a rectangle; half: half of its sides along x and y."""
+
+    half: Numbers
+    translation: Numbers = None
+    rotation: Numbers = None
+    name = "square"
+    dimensions = 2
+    counts = {"half": 2}
+
+    def _formula(self):
+        return formulas.box
+
+
+@dataclass(frozen=True, eq=False)
+class Circle(Primitive):
+    radius: Numbers
+    translation: Numbers = None
+    rotation: Numbers = None
+    name = "circle"
+    dimensions = 2
+    counts = {"radius": 1}
+
+    def _formula(self):
+        return formulas.sphere
+
+
+@dataclass(frozen=True, eq=False)
+class Triangle(Primitive):
+    """Base from (-left, 0) to (right, 0), apex at (0, height)."""
+
+    left: Numbers
+    right: Numbers
+    height: Numbers
+    translation: Numbers = None
+    rotation: Numbers = None
+    name = "triangle"
+    dimensions = 2
+    counts = {"left": 1, "right": 1, "height": 1}
+
+    def _formula(self):
+        return formulas.triangle
+
+
+@dataclass(frozen=True, eq=False)
+class HalfPlane(Primitive):
+    """What lies below its own line y = 0."""
+
+    translation: Numbers = None
+    rotation: Numbers = None
+    name = "halfplane"
+    dimensions = 2
+
+    def _formula(self):
+        return formulas.half_plane
+
+
+KINDS = {kind.name: kind for kind in (Box, Sphere, Cylinder, Cone, Square, Circle, Triangle, HalfPlane)}
+
+
+def _tensor(numbers: Numbers) -> Tensor:
+    """A tensor stays what it is; everything else becomes float64. Raises ProgramError for what are no numbers."""
+    if isinstance(numbers, Tensor):
+        return numbers
+    try:
+        return torch.as_tensor(numbers, dtype=torch.float64)
+    except (TypeError, ValueError, RuntimeError):
+        raise ProgramError(f"found {numbers!r:.40}", expected="numbers") from None
+
+
+def stack(primitives: Sequence[Primitive]) -> Primitive:
+    """One batch (n) of single primitives of equal form."""
+    first = primitives[0]
+    return type(first)(**{key: torch.stack([getattr(p, key) for p in primitives]) for key in first.written})
+
+
+def distances(primitives: Sequence[Primitive], points: Float[Tensor, "m d"]) -> Float[Tensor, "k m"]:
+    """Signed distances of all points to each single primitive, in order; kinds are computed batch by batch."""
+    places: dict[tuple, list[int]] = {}
+    for place, primitive in enumerate(primitives):
+        places.setdefault(primitive.form, []).append(place)
+    rows = torch.cat([stack([primitives[i] for i in group]).distance(points) for group in places.values()])
+    order = torch.tensor([i for group in places.values() for i in group], device=rows.device)
+    return rows[order.argsort()]

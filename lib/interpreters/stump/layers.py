@@ -1,16 +1,17 @@
-"""The three layers on values, rows first: O is (K, points), S (C, points), T (points); any number of batches before.
+"""The three layers on values, rows first: O and F are (K, points), S (C, points), T (points); any batches before.
 
-`binary` is the language itself: shapes are in or out and connections 0 or 1.
+    F = W_C (1 - O) + (1 - W_C) O      S = min_k (W_I F + 1 - W_I)      T = max_c W_U S        (paper, "Structure")
+
+`binary` is the language itself: shapes are in or out, connections 0 or 1. `soft` is what a network learns with: all
+values from 0 to 1. With a temperature its min and max are averages that lean to the smallest and the largest value,
+weights softmax(-temperature value) and softmax(temperature value), held constant in the gradient, as in the paper's
+program (there 20); without, they are exact.
 """
 
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-
-def complement(occupancy: Float[Tensor, "*n k m"], w_c: Float[Tensor, "*#n k"]) -> Float[Tensor, "*n k m"]:
-    """F = W_C (1 - O) + (1 - W_C) O, the paper's equation (2)."""
-    w_c = w_c.unsqueeze(-1)
-    return w_c * (1 - occupancy) + (1 - w_c) * occupancy
+from .products import max_product
 
 
 def binary(
@@ -24,3 +25,38 @@ def binary(
     lacking = (inside == w_c.unsqueeze(-1)).float()  # 1 - F
     nodes = w_i.mT.float() @ lacking == 0
     return nodes, (nodes & w_u.unsqueeze(-1)).any(-2)
+
+
+def soft(
+    occupancy: Float[Tensor, "*n k m"],
+    w_c: Float[Tensor, "*#n k"],
+    w_i: Float[Tensor, "*#n k c"],
+    w_u: Float[Tensor, "*#n c"],
+    temperature: float | None = None,
+) -> tuple[Float[Tensor, "*n c m"], Float[Tensor, "*n m"]]:
+    """S and T of values from 0 to 1; differentiable in all four. An intersection of nothing is 1, a union of nothing 0.
+
+    Raises ValueError for a temperature out of range.
+    """
+    nodes = intersection(complement(occupancy, w_c), w_i, temperature)
+    return nodes, union(nodes, w_u, temperature)
+
+
+def complement(occupancy: Float[Tensor, "*n k m"], w_c: Float[Tensor, "*#n k"]) -> Float[Tensor, "*n k m"]:
+    """F."""
+    w_c = w_c.unsqueeze(-1)
+    return w_c * (1 - occupancy) + (1 - w_c) * occupancy
+
+
+def intersection(
+    selected_from: Float[Tensor, "*n k m"], w_i: Float[Tensor, "*#n k c"], temperature: float | None = None
+) -> Float[Tensor, "*n c m"]:
+    """S = min_k (W F + 1 - W) = 1 - max_k W (1 - F)."""
+    return 1 - max_product(w_i, 1 - selected_from, temperature)
+
+
+def union(
+    nodes: Float[Tensor, "*n c m"], w_u: Float[Tensor, "*#n c"], temperature: float | None = None
+) -> Float[Tensor, "*n m"]:
+    """T = max_c W_U S."""
+    return max_product(w_u.unsqueeze(-1), nodes, temperature).squeeze(-2)

@@ -8,8 +8,10 @@ O_k(x) is 1 inside primitive k, its surface included, else 0. Two edges follow f
 nothing is the whole space, and a union of nothing is empty. (CSG-Stump Net, Ren et al. 2021, "CSG-Stump Structure".)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
@@ -18,6 +20,7 @@ from .errors import ProgramError
 from .primitives import Primitive, distances
 
 EVERYTHING, NOTHING = "everything", "nothing"  # an intersection, and a union, of nothing
+Matrix = Tensor | np.ndarray | Sequence  # of 0 and 1, False and True
 MOST = 1 << 26  # cells of the intersection matrix: 64 MB
 
 
@@ -28,14 +31,14 @@ class Stump:
     Raises ProgramError for anything else. `parse(stump.to_text()) == stump`.
     """
 
-    primitives: tuple[Primitive, ...]
-    complement: Bool[Tensor, " k"]
-    intersection: Bool[Tensor, "k c"]
-    union: Bool[Tensor, " c"]
+    primitives: Sequence[Primitive]  # becomes a tuple
+    complement: Matrix  # (K), becomes a tensor of bools
+    intersection: Matrix  # (K, C)
+    union: Matrix  # (C)
 
     def __post_init__(self):
         object.__setattr__(self, "primitives", tuple(self.primitives))
-        _check_primitives(self.primitives)
+        check_primitives(self.primitives)
         count = len(self.primitives)
         for key, shape in (("complement", (count,)), ("intersection", (count, None)), ("union", (None,))):
             object.__setattr__(self, key, _binary(key, getattr(self, key), shape))
@@ -127,7 +130,8 @@ class Stump:
         return to_tree(self)
 
 
-def _check_primitives(primitives: tuple) -> None:
+def check_primitives(primitives: tuple) -> None:
+    """Raises ProgramError unless these are one or more single primitives, all of the plane or all of space."""
     if not primitives:
         raise ProgramError("the stump has no primitives", expected="at least one")
     for place, primitive in enumerate(primitives, start=1):

@@ -1,0 +1,124 @@
+"""The product of the layers, block by block, against the one big tensor of the textbook."""
+
+import pytest
+import torch
+from torch.utils._python_dispatch import TorchDispatchMode
+
+from lib.interpreters.stump import layers, products
+from lib.interpreters.stump.products import STEEPEST, max_product
+
+TEMPERATURES = [None, 1.0, 20.0, STEEPEST]
+
+
+def textbook(w, g, temperature):
+    """The same from the (K, C, points) tensor, the weights held constant in the gradient."""
+    every = w.unsqueeze(-1) * g.unsqueeze(-2)
+    if temperature is None:
+        return every.amax(-3)
+    weights = torch.softmax(temperature * every.detach(), -3)
+    return (weights * every).sum(-3)
+
+
+def drawn(*shape, seed=0):
+    generator = torch.Generator().manual_seed(seed)
+    return torch.rand(*shape, generator=generator, dtype=torch.float64).requires_grad_()
+
+
+class LargestTensor(TorchDispatchMode):
+    """Watches every operation and remembers the most numbers that any result had."""
+
+    most = 0
+
+    def __torch_dispatch__(self, function, types, arguments=(), keywords=None):
+        result = function(*arguments, **(keywords or {}))
+        if isinstance(result, torch.Tensor):
+            self.most = max(self.most, result.numel())
+        return result
+
+
+@pytest.mark.parametrize("temperature", TEMPERATURES)
+@pytest.mark.parametrize("block", [1, 17, 1 << 17])
+def test_is_the_textbook_product_with_its_gradients(monkeypatch, temperature, block):
+    monkeypatch.setattr(products, "_CACHE", block)
+    w, g, up = drawn(3, 7, 5), drawn(3, 7, 11, seed=1), drawn(3, 5, 11, seed=2).detach()
+    found, expected = max_product(w, g, temperature), textbook(w, g, temperature)
+    torch.testing.assert_close(found, expected, atol=1e-12, rtol=0)
+    gradients = torch.autograd.grad((found * up).sum(), (w, g))
+    torch.testing.assert_close(
+        gradients, torch.autograd.grad((expected * up).sum(), (w, g)), atol=1e-12, rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("temperature", TEMPERATURES)
+def test_one_matrix_serves_a_batch(temperature):
+    w, g = drawn(4, 3), drawn(2, 6, 4, 5, seed=1)
+    found = max_product(w, g, temperature)
+    assert found.shape == (2, 6, 3, 5)
+    torch.testing.assert_close(found, textbook(w.expand(2, 6, 4, 3), g, temperature), atol=1e-12, rtol=0)
+    assert torch.autograd.grad(found.sum(), w)[0].shape == (4, 3)
+
+
+def test_of_equal_products_the_first_has_the_gradient():
+    w, g = torch.ones(3, 1, requires_grad=True), torch.tensor([[0.2], [0.7], [0.7]], requires_grad=True)
+    max_product(w, g).sum().backward()
+    assert g.grad.flatten().tolist() == [0, 1, 0]
+    assert w.grad.flatten().tolist() == pytest.approx([0, 0.7, 0])
+
+
+def test_a_high_temperature_comes_near_the_maximum():
+    w, g = drawn(6, 4), drawn(6, 9, seed=1)
+    off = [(max_product(w, g, t) - max_product(w, g)).abs().max().item() for t in (5.0, 20.0, 160.0)]
+    assert off == sorted(off, reverse=True) and off[-1] < 0.02
+
+
+@pytest.mark.parametrize("temperature", [None, 20.0])
+def test_of_nothing_it_is_nothing(temperature):
+    assert max_product(torch.zeros(0, 2), torch.zeros(0, 3), temperature).tolist() == [[0, 0, 0], [0, 0, 0]]
+
+
+def test_extreme_values_stay_finite_in_float32():
+    w, g = torch.ones(5, 2, requires_grad=True), torch.ones(5, 3, requires_grad=True)
+    for temperature in TEMPERATURES:
+        for values in (w, w.detach() * 0):
+            result = max_product(values, g, temperature)
+            assert result.isfinite().all() and torch.autograd.grad(result.sum(), g)[0].isfinite().all()
+
+
+@pytest.mark.parametrize("temperature", [0, -1.0, STEEPEST + 1, float("nan")])
+def test_a_temperature_out_of_range_is_refused(temperature):
+    with pytest.raises(ValueError, match="temperature of .*; expected more than 0, at most 160"):
+        max_product(torch.ones(2, 2), torch.ones(2, 2), temperature)
+
+
+@pytest.mark.parametrize("temperature", [None, 20.0])
+def test_no_tensor_of_all_products_is_ever_made(temperature):
+    w, g = torch.rand(64, 48, requires_grad=True), torch.rand(64, 4096, requires_grad=True)
+    with LargestTensor() as watched:
+        max_product(w, g, temperature).sum().backward()
+    assert watched.most == 64 * 4096  # the largest input; all products would be 48 times as many
+
+
+def test_layers_are_the_papers_formulas():
+    """F, S and T of arbitrary values, written out as in the paper."""
+    occupancy, w_c, w_i, w_u = drawn(4, 9), drawn(4, seed=1), drawn(4, 3, seed=2), drawn(3, seed=3)
+    f = w_c[:, None] * (1 - occupancy) + (1 - w_c[:, None]) * occupancy
+    s = [min(w_i[k, c] * f[k, n] + 1 - w_i[k, c] for k in range(4)) for c in range(3) for n in range(9)]
+    s = torch.stack(s).view(3, 9)
+    t = torch.stack([max(w_u[c] * s[c, n] for c in range(3)) for n in range(9)])
+    nodes, values = layers.soft(occupancy, w_c, w_i, w_u)
+    torch.testing.assert_close(nodes, s)
+    torch.testing.assert_close(values, t)
+
+
+def test_yes_and_no_are_the_formulas_with_zeros_and_ones():
+    generator = torch.Generator().manual_seed(0)
+    for size in [(1, 1), (5, 3), (8, 0), (3, 6)]:
+        inside = torch.rand(20, size[0], 50, generator=generator) < 0.5
+        w_c = torch.rand(20, size[0], generator=generator) < 0.5
+        w_i = torch.rand(20, *size, generator=generator) < 0.4  # some nodes select nothing
+        w_u = torch.rand(20, size[1], generator=generator) < 0.5
+        nodes, values = layers.soft(*(each.float() for each in (inside, w_c, w_i, w_u)))
+        assert all(
+            torch.equal(found, expected > 0.5)
+            for found, expected in zip(layers.binary(inside, w_c, w_i, w_u), (nodes, values))
+        )

@@ -105,12 +105,11 @@ def _smooth(w, g, result, scale, temperature) -> None:
     room = torch.empty_like(scale)
     scale.zero_()
     for product in _products(w, g, temperature):
-        torch.exp(
-            torch.sub(product, temperature / 2, out=room), out=room
-        )  # the shift cancels, and keeps exp in range
+        product -= temperature / 2  # cancels, and keeps exp in range
+        torch.exp(product, out=room)
         scale += room
         result.addcmul_(room, product)
-    result.div_(scale).div_(temperature)
+    result.div_(scale).add_(temperature / 2).div_(temperature)
 
 
 def _smooth_shares(w, g, scale, gradient, temperature) -> Iterator[Tensor]:

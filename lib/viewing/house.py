@@ -19,7 +19,8 @@ _ROOMS = {
     "fit": (63, 10, 15, "fit by\ngradient", "02", "#f6e3d2"),
     "measure": (88, 36, 17, "metrics,\npictures", "06", "#ece4f3"),
     "csg": (88, 10, 17, "CSG program:\npicture, voxels", "08", "#d6e4f5"),
-    "readers": (114, 10, 19, "networks that\nread shapes;\nCSG-Stump", "09 to 12", "#f6e3d2"),
+    "stump": (114, 36, 19, "CSG-Stump:\nthree matrices", "11", "#d6e4f5"),
+    "readers": (114, 10, 19, "networks that\nread shapes", "09 10 12", "#f6e3d2"),
 }
 # from, to, word, offset of the word from the middle of the arrow
 _DOORS = (
@@ -30,9 +31,13 @@ _DOORS = (
     ("network", "program", "write", (5, 2)),
     ("shape", "fit", "compare", (5.5, 0)),
     ("fit", "program", "change\nnumbers", (6, 2.5)),
-    ("csg", "measure", "same\nquestions", (6, -1)),
+    ("csg", "measure", "same\nquestions", (-6, -1)),
     ("csg", "readers", "learn", (0, -4)),
     ("readers", "csg", "write", (0, 2.5)),
+    ("readers", "stump", "write", (4.5, 0)),
+    ("csg", "stump", "convert", (6, -4)),
+    ("stump", "csg", "", (0, 0)),
+    ("stump", "measure", "", (0, 0)),
 )
 
 

@@ -10,9 +10,9 @@ import torch
 import trimesh
 
 from lib.interpreters.csg import KINDS, ProgramError, execute, execute_many, parse, vocabulary_of
-from lib.interpreters.csg.outlines import shoelace
 from lib.interpreters.csg.primitives import Primitive
 from lib.interpreters.csg.program import Operation, Program
+from lib.interpreters.rings import shoelace
 
 SEGMENTS = 64  # of meshes and outlines unless told otherwise
 # How far a polygon or polyhedron with 64 segments is from the true circle or sphere, as a share of the radius (the

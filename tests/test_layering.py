@@ -14,6 +14,7 @@ MAY_IMPORT = {  # part of lib -> the parts it may import beside itself
     "extractor": ["metrics", *LANGUAGES],  # an extraction is validated by measuring it
     "models": LANGUAGES,
     "metrics": LANGUAGES,
+    "finding": ["metrics", *LANGUAGES],
     "training": [*GEOMETRY, *LANGUAGES],
     "viewing": [*GEOMETRY, *LANGUAGES],
     "exercises": [*GEOMETRY, *LANGUAGES],
@@ -26,6 +27,7 @@ LANGUAGE_LIBRARIES = {
     "jaxtyping",
     "trimesh",
     "manifold3d",
+    "skimage",
 } | {  # and of the standard library:
     *(
         "__future__",

@@ -16,6 +16,7 @@ import numpy as np
 import traitlets
 from matplotlib.figure import Figure
 
+from lib.interpreters.checks import whole
 from lib.interpreters.csg import (
     KINDS,
     OPERATIONS,
@@ -26,7 +27,6 @@ from lib.interpreters.csg import (
     trace,
     vocabulary_of,
 )  # fmt: skip
-from lib.interpreters.csg.geometry import whole
 from lib.interpreters.csg.primitives import draw
 from lib.interpreters.csg.program import STOP, Operation, Statement
 from lib.interpreters.csg.tracing import missing, parse_start

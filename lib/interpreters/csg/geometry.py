@@ -18,11 +18,11 @@ import operator
 from collections.abc import Callable
 from typing import TypeVar
 
-import numpy as np
 import torch
 from jaxtyping import Bool
 from torch import Tensor
 
+from ..checks import check_points, check_resolution
 from .packing import SIDE
 from .primitives import Primitive, square_corners, triangle_corners
 from .program import Program
@@ -58,26 +58,8 @@ def inside(program: Program, *coordinates: Tensor) -> Bool[Tensor, "..."]:
 
 def occupancy(program: Program, points) -> Bool[Tensor, " n"]:
     """Is each of the points (n, 2) or (n, 3) in the shape? Points that are not finite are not."""
-    parts = _points(points, "xyz"[: program.dimensions]).split(_AT_ONCE)
+    parts = check_points(points, "xyz"[: program.dimensions]).split(_AT_ONCE)
     return torch.cat([inside(program, *part.double().unbind(1)) for part in parts])
-
-
-def _points(points, axes: str) -> Tensor:
-    """(n, axes) numbers. Raises ValueError for everything else."""
-    expected = f"(n, {len(axes)}) numbers: {', '.join(axes)}"
-    found = f"a {type(points).__name__}"
-    try:
-        if isinstance(points, np.ndarray):  # torch takes neither negative strides nor foreign byte orders
-            found = f"an array of {points.dtype}"
-            points = np.ascontiguousarray(points, dtype=points.dtype.newbyteorder("="))
-        points = torch.as_tensor(points)
-    except (TypeError, ValueError, RuntimeError):
-        raise ValueError(f"found {found}; expected points {expected}") from None
-    if points.is_complex():
-        raise ValueError(f"found complex points; expected {expected}")
-    if points.ndim != 2 or points.shape[1] != len(axes):
-        raise ValueError(f"found points of shape {tuple(points.shape)}; expected {expected}")
-    return points
 
 
 def voxels(program: Program, resolution: int, device: torch.device | str = "cpu") -> Bool[Tensor, "r *rs"]:
@@ -85,9 +67,7 @@ def voxels(program: Program, resolution: int, device: torch.device | str = "cpu"
 
     [row y, column x] in the plane, [x, y, z] in space.
     """
-    found, resolution = resolution, whole(resolution)
-    if resolution is None or resolution < 1:
-        raise ValueError(f"found a resolution of {found}; expected a whole number, at least 1")
+    resolution = check_resolution(resolution)
     centers = (torch.arange(resolution, dtype=torch.float64, device=device) + 0.5) * SIDE / resolution - 0.5
     others = program.dimensions - 1
     filled = torch.empty((resolution,) * program.dimensions, dtype=torch.bool, device=device)
@@ -98,14 +78,6 @@ def voxels(program: Program, resolution: int, device: torch.device | str = "cpu"
         axes = (first, *rest) if others == 2 else (*rest, first)
         filled[start : start + step] = inside(program, *axes)
     return filled
-
-
-def whole(number) -> int | None:
-    """The number as an int, numpy's and torch's too; None for what is no whole number: 2.0, True, a text."""
-    try:
-        return None if isinstance(number, bool) else operator.index(number)
-    except TypeError:
-        return None
 
 
 def square_edges(x: int, y: int, r: int) -> tuple[float, float, float, float]:

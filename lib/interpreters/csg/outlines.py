@@ -1,43 +1,29 @@
-"""Outlines of pictures: closed rings, their area, points on them, an SVG file, and a plate to print or to cut.
+"""Outlines of pictures: closed rings, their area, an SVG file, and a plate to print or to cut.
 
-Coordinates are the picture's, x right and y DOWN, except for the plate's. Circles are polygons whose corners lie a
-little outside the true circle, so that both have the same area: with 64 corners no point of the polygon is farther than
-r/1200 from the circle. The booleans are Clipper2's, by way of manifold3d; it rounds to 8 decimals. The area needs no
-polygons: it is exact.
+Coordinates are the picture's, x right and y DOWN, except for the plate's. Circles are polygons of the same area (see
+lib.interpreters.rings). The area needs no polygons: it is exact.
 """
 
-import math
 import operator
-import re
 
-import numpy as np
 import torch
-from jaxtyping import Float
 from manifold3d import CrossSection, Manifold
 
-from .geometry import fold, inside, trapezoid, whole
+from .. import rings as shared
+from ..checks import check_segments
+from ..rings import Rings, swollen
+from .geometry import fold, inside, trapezoid
 from .packing import SIDE
 from .primitives import Primitive
 from .program import Program
 
-MOST_SEGMENTS = 1024  # corners of a full circle: a sphere of so many has half a million triangles
-LOWEST, HIGHEST = 1e-6, 1e6  # pixels: plates beyond would lose their corners to rounding
 DUST = 1e-6  # square pixels: smaller rings are left over from rounding
 _AT_ONCE = 1 << 20  # places between borders that `area` looks at in one step
-_COLOR = re.compile(r"#?[A-Za-z0-9]+|[a-z]+\([0-9., %]*\)")
-
-Rings = list[Float[np.ndarray, "_ 2"]]  # corners; not all rings have as many
 
 
 def rings(program: Program, segments: int) -> Rings:
-    """The outline: closed rings, each (corners, 2) without its first corner repeated.
-
-    The shoelace formula, sum of x * y' - x' * y over 2, is positive for outer rings and negative for holes.
-    """
-    contours = (
-        contour for contour in section(program, segments).to_polygons() if abs(shoelace(contour)) > DUST
-    )
-    return [np.asarray(contour, dtype=np.float64) for contour in contours]
+    """The outline: closed rings, their shoelace positive for outer rings and negative for holes."""
+    return shared.rings(section(program, segments), DUST)
 
 
 def section(program: Program, segments: int) -> CrossSection:
@@ -47,55 +33,18 @@ def section(program: Program, segments: int) -> CrossSection:
     return fold(program, lambda primitive: _polygon(primitive, segments), operations)
 
 
-def check_segments(segments: int) -> int:
-    """The number of corners of a circle as an int. Raises ValueError for what cannot be one."""
-    number = whole(segments)
-    if number is None or number % 4 or not 4 <= number <= MOST_SEGMENTS:
-        raise ValueError(f"found {segments} segments; expected a multiple of 4 from 4 to {MOST_SEGMENTS}")
-    return number
-
-
-def swollen(segments: int) -> float:
-    """How much farther out the corners of a polygon are than the circle that has the same area."""
-    return math.sqrt(2 * math.pi / segments / math.sin(2 * math.pi / segments))
-
-
-def shoelace(ring: Float[np.ndarray, "corners 2"]) -> float:
-    """The area within a ring, negative for one that runs the other way round."""
-    x, y = ring[:, 0], ring[:, 1]
-    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
-
-
-def points_on(outline: Rings, n: int, seed: int) -> Float[np.ndarray, "n 2"]:
-    """n points on the rings, uniform by length."""
-    start = np.concatenate(outline)
-    step = np.concatenate([np.roll(ring, -1, axis=0) for ring in outline]) - start
-    rng = np.random.default_rng(seed)
-    length = np.linalg.norm(step, axis=1)
-    edge = rng.choice(len(start), n, p=length / length.sum())
-    return start[edge] + rng.random((n, 1)) * step[edge]
-
-
 def plate(program: Program, height: float, segments: int) -> Manifold:
     """The picture as a plate, from z = 0 up to `height`. x grows right and y UP: seen from above it is the picture.
 
     The picture's row y lies at 63 - y.
     """
-    if not LOWEST <= height <= HIGHEST:
-        raise ValueError(f"found a height of {height}; expected {LOWEST:g} to {HIGHEST:g} pixels")
     upright = [ring[::-1] * (1, -1) + (0, SIDE - 1) for ring in rings(program, segments)]
-    return CrossSection(upright).extrude(height) if upright else Manifold()
+    return shared.plate(upright, height, name="pixels")
 
 
 def to_svg(outline: Rings, color: str) -> str:
-    """One path in the picture's axes; the file shows the canvas. Coordinates are rounded to 3 decimals."""
-    if not _COLOR.fullmatch(color):
-        raise ValueError(f"found {color!r}; expected a colour such as '#5e8bba' or 'black'")
-    path = "\n".join("M" + " ".join(f"{_short(x)},{_short(y)}" for x, y in ring) + "Z" for ring in outline)
-    return (
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="-0.5 -0.5 64 64" width="512" height="512">\n'
-        f'<path fill="{color}" fill-rule="evenodd" d="\n{path}"/>\n</svg>\n'
-    )
+    """One path in the picture's axes; the file shows the canvas."""
+    return shared.svg(outline, color, f"-0.5 -0.5 {SIDE} {SIDE}")
 
 
 def area(program: Program) -> float:
@@ -120,11 +69,6 @@ def _polygon(primitive: Primitive, segments: int) -> CrossSection:
         return CrossSection.circle(r * swollen(segments), segments).translate((x, y))
     (top, bottom), left, right = trapezoid(primitive)
     return CrossSection([[(left[0], top), (right[0], top), (right[1], bottom), (left[1], bottom)]])
-
-
-def _short(number: float) -> str:
-    """At most 3 decimals, and no -0."""
-    return f"{round(float(number), 3) + 0.0:.10g}"
 
 
 def _borders(program: Program) -> tuple[torch.Tensor, torch.Tensor]:

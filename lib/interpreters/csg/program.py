@@ -137,6 +137,12 @@ class Program:
         """The program as a text without blanks, such as "c(32,32,28)s(32,32,20)-"; parse reads it back."""
         return "".join(map(str, self.statements))
 
+    def to_openscad(self) -> str:
+        """An OpenSCAD file of the exact shape; `openscad.read` gives the same program."""
+        from ..openscad import write
+
+        return write(self)
+
     def tokens(self, vocabulary=None, length: int | None = None) -> Int[Tensor, " tokens"]:
         """Indices into the vocabulary of the program's dimension (or another), padded with `$` up to `length`.
 

@@ -24,9 +24,9 @@ import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
 
+from ..checks import whole
 from ..threads import one_thread
 from .errors import ProgramError
-from .geometry import whole
 from .program import Program
 from .vocabulary import vocabulary_of
 

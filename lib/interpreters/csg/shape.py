@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from ..checks import check_inside, draw
 from . import geometry
 from .errors import ProgramError
 from .packing import SIDE, count, unpack
@@ -56,9 +57,9 @@ class Shape:
 
         Raises ProgramError for a shape without an inside.
         """
-        from .solids import stl
+        from ..meshes import stl
 
-        return stl(_with_inside(self.mesh()))
+        return stl(check_inside(self.mesh(), ProgramError))
 
 
 class Picture(Shape):
@@ -87,9 +88,9 @@ class Picture(Shape):
 
     def surface_points(self, n: int, seed: int = 0) -> Float[Tensor, "n 2"]:
         """n points on the outline, uniform by length. Raises ProgramError for a shape without an inside."""
-        from .outlines import points_on
+        from ..rings import points_on
 
-        return _drawn(points_on, self.outline(), n, seed)
+        return draw(points_on, check_inside(self.outline(), ProgramError), n, seed)
 
     def mesh(self, height: float = 8.0, segments: int = 64):
         """A trimesh.Trimesh: the picture cut out of a plate, watertight; without faces if there is nothing inside.
@@ -97,8 +98,9 @@ class Picture(Shape):
         x, 63 - y and z from 0 to `height` pixels: from above, where z points, it looks like the picture.
         height: from 1e-6 to 1e6. Raises ValueError.
         """
+        from ..meshes import triangles
         from .outlines import plate
-        from .solids import DUST, triangles
+        from .solids import DUST
 
         return triangles(plate(self.program, height, segments), DUST * min(1, height))
 
@@ -106,13 +108,13 @@ class Picture(Shape):
         """The outline as an SVG file that shows the canvas. Raises ProgramError for a shape without an inside."""
         from .outlines import to_svg
 
-        return to_svg(_with_inside(self.outline()), color)
+        return to_svg(check_inside(self.outline(), ProgramError), color)
 
     def to_glb(self) -> bytes:
         """The plate as a GLB file, standing upright. Raises ProgramError for a shape without an inside."""
-        from .solids import glb
+        from ..meshes import glb
 
-        return glb(_with_inside(self.mesh()), turn=False)
+        return glb(check_inside(self.mesh(), ProgramError), turn=False)
 
 
 class Solid(Shape):
@@ -128,35 +130,22 @@ class Solid(Shape):
 
         segments: corners of a whole circle, a multiple of 4.
         """
-        from .solids import solid, triangles
+        from ..meshes import triangles
+        from .solids import DUST, solid
 
-        return triangles(solid(self.program, segments))
+        return triangles(solid(self.program, segments), DUST)
 
     def surface_points(self, n: int, seed: int = 0) -> Float[Tensor, "n 3"]:
         """n points on the mesh, uniform by area. Raises ProgramError for a shape without an inside."""
-        from .solids import points_on
+        from ..meshes import points_on
 
-        return _drawn(points_on, self.mesh(), n, seed)
+        return draw(points_on, check_inside(self.mesh(), ProgramError), n, seed)
 
     def to_glb(self) -> bytes:
         """The mesh as a GLB file, where y is up: x, z, -y. Raises ProgramError for a shape without an inside."""
-        from .solids import glb
+        from ..meshes import glb
 
-        return glb(_with_inside(self.mesh()), turn=True)
-
-
-def _with_inside(made):
-    """The rings or mesh. Raises ProgramError where there are none."""
-    if not len(getattr(made, "faces", made)):
-        raise ProgramError("the shape has no inside", expected="a program that leaves something over")
-    return made
-
-
-def _drawn(points_on, surface, n: int, seed: int) -> Float[Tensor, "n d"]:
-    number = geometry.whole(n)
-    if number is None or number < 0:
-        raise ValueError(f"found {n} points; expected a whole number, at least 0")
-    return torch.from_numpy(points_on(_with_inside(surface), number, seed)).float()
+        return glb(check_inside(self.mesh(), ProgramError), turn=True)
 
 
 class Shapes(Sequence):

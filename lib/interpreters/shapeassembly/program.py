@@ -154,6 +154,12 @@ class Program:
         """The program as text; `parse(program.to_text()) == program`."""
         return "".join(block.to_text() for block in self.blocks)
 
+    def to_openscad(self) -> str:
+        """An OpenSCAD file of the boxes that the program makes; `openscad.read` gives these as `Parts`."""
+        from ..openscad import write
+
+        return write(self)
+
     def statements(self) -> Iterator[tuple[Block, int, Statement]]:
         """Every statement in text order, with its block and its index in the block."""
         for block in self.blocks:

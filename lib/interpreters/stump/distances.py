@@ -24,7 +24,10 @@ Distances = Float[Tensor, "*n m"]
 
 def norm(vectors: Float[Tensor, "*n d"]) -> Float[Tensor, "*n"]:
     """Length. At zero the gradient is 0 instead of NaN."""
-    return torch.linalg.vector_norm(vectors, dim=-1)
+    # Not vector_norm: that is thirty times slower where, as here, the last dimension is not the last in memory.
+    squares = vectors.square().sum(-1)
+    zero = squares == 0
+    return squares.masked_fill(zero, 1).sqrt().masked_fill(zero, 0)
 
 
 def box(points: Points, half: Sizes) -> Distances:
@@ -42,19 +45,23 @@ def cylinder(points: Points, radius: Sizes) -> Distances:
 def capped_cylinder(points: Points, sizes: Sizes) -> Distances:
     """sizes: radius, height; the origin is in the middle."""
     radius, height = sizes.abs().unsqueeze(-2).unbind(-1)
-    return _from_faces(torch.stack([norm(points[..., :2]) - radius, points[..., 2].abs() - height / 2], -1))
+    return _from_faces(_beside(norm(points[..., :2]) - radius, points[..., 2].abs() - height / 2))
 
 
 def cone(points: Points, slope: Sizes) -> Distances:
-    slope, z = slope.abs(), points[..., 2]
-    mantle = (norm(points[..., :2]) - slope * z) / (1 + slope**2).sqrt()
-    return torch.where(z >= 0, mantle, norm(points))
+    return torch.where(points[..., 2] >= 0, mantle(points, slope), norm(points))
+
+
+def mantle(points: Points, slope: Sizes) -> Distances:
+    """Of the boundless cone, without a jump; below the apex's plane too small, but of the right sign."""
+    slope = slope.abs()
+    return (norm(points[..., :2]) - slope * points[..., 2]) / (1 + slope**2).sqrt()
 
 
 def capped_cone(points: Points, sizes: Sizes) -> Distances:
     """sizes: slope, height; the apex is at the origin, the base at z = height."""
     slope, height = sizes.abs().unsqueeze(-2).unbind(-1)
-    section = torch.stack([norm(points[..., :2]), points[..., 2]], -1)
+    section = _beside(norm(points[..., :2]), points[..., 2])
     apex, rim = torch.zeros_like(sizes[..., :2]), torch.stack([slope * height, height], -1).squeeze(-2)
     foot = torch.stack([torch.zeros_like(height), height], -1).squeeze(-2)
     nearest = torch.minimum(_to_segment(section, apex, rim), _to_segment(section, rim, foot))
@@ -79,6 +86,11 @@ def triangle(points: Points, sizes: Sizes) -> Distances:
 def half_plane(points: Points, sizes: Sizes) -> Distances:
     """No sizes: what lies below the line y = 0."""
     return points[..., 1] + 0 * sizes.sum(-1, keepdim=True)
+
+
+def _beside(x: Distances, y: Distances) -> Float[Tensor, "*n m 2"]:
+    """Points of the plane, all x before all y in memory, as `Primitive.local` makes them."""
+    return torch.stack([x, y], -2).mT
 
 
 def _from_faces(q: Float[Tensor, "*n m d"]) -> Distances:

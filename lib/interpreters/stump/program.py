@@ -76,6 +76,12 @@ class Stump:
 
         return to_text(self)
 
+    def to_openscad(self) -> str:
+        """An OpenSCAD file; `openscad.read` gives the same stump."""
+        from ..openscad import write
+
+        return write(self)
+
     def parameters(self) -> Float[Tensor, " p"]:
         """All numbers of all primitives in text order: sizes, translation, rotation of each."""
         return torch.cat([primitive.numbers for primitive in self.primitives])
@@ -122,6 +128,20 @@ class Stump:
         from .trees import from_tree
 
         return from_tree(tree)
+
+    @staticmethod
+    def from_csg(program) -> "Stump":
+        """The stump that is the same solid as a CSG program, in pixels, y down in the plane; see `converting`."""
+        from .converting import csg_tree
+
+        return Stump.from_tree(csg_tree(program))
+
+    @staticmethod
+    def from_shapeassembly(program) -> "Stump":
+        """The stump that is the same solid as a ShapeAssembly program: one node for each leaf cuboid."""
+        from .converting import shapeassembly_tree
+
+        return Stump.from_tree(shapeassembly_tree(program))
 
     def to_tree(self):
         """A tree of operations that is the same solid; see `trees`."""

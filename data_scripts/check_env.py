@@ -15,6 +15,7 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 PYPROJECT = Path(__file__).parents[1] / "pyproject.toml"
+IMPORTED_AS = {"scikit-image": "skimage"}  # packages whose modules have another name
 
 
 class Row(NamedTuple):
@@ -44,7 +45,7 @@ def check_package(requirement: Requirement) -> Row:
     if not requirement.specifier.contains(found, prereleases=True):
         return Row(name, needed, found, False, f"needs {needed}: run make setup")
     try:
-        importlib.import_module(name.replace("-", "_"))
+        importlib.import_module(IMPORTED_AS.get(name, name.replace("-", "_")))
     except Exception as error:  # a broken package can raise anything while it is imported
         return Row(name, needed, found, False, f"installed, but does not import: {error}")
     return Row(name, needed, found, True, "")

@@ -23,8 +23,12 @@ T = S1
 """
 CELLS = [
     f"from lib.viewing.stump_widget import StumpWidget\nwidget = StumpWidget({PLATE!r})\nwidget",
-    "widget.toggle('not F2')\nprint(widget.text)",
 ]
+LARGE = "".join(
+    [*(f"F{k} = circle(radius=0.2, translation=({k / 10}, {k % 3 / 10}))\n" for k in range(1, 13)),
+     *(f"S{c} = F{c} & F{c % 12 + 1}\n" for c in range(1, 13)),
+     f"T = {' | '.join(f'S{c}' for c in range(1, 13))}\n"]
+)  # fmt: skip
 WATCH = """(root) => {
     window.clicked = window.drawn = 0;
     document.addEventListener("click", () => { window.clicked = performance.now() }, true);
@@ -44,7 +48,7 @@ def page(tmp_path_factory):
     """A notebook with one widget, after its first cell has run."""
     sync_api, chromium = playwright_and_chromium()
     folder = tmp_path_factory.mktemp("notebooks")
-    (folder / "stump.ipynb").write_text(json.dumps(notebook(CELLS[:1])))
+    (folder / "stump.ipynb").write_text(json.dumps(notebook(CELLS)))
     with (
         jupyterlab(folder, tmp_path_factory.mktemp("lab")) as address,
         sync_api.sync_playwright() as play,
@@ -169,14 +173,19 @@ def test_the_text_is_copied(widget):
     assert widget.page.evaluate("navigator.clipboard.readText()") == empty
 
 
-def test_python_flips_a_cell_too(widget):
-    page = widget.page
+def run_cell(page, source: str) -> None:
+    """Put a cell below the others and run it."""
     page.evaluate(f"""() => {{
-        const cells = window.jupyterapp.shell.currentWidget.content.model.sharedModel;
-        cells.insertCell(1, {{ cell_type: "code", source: {CELLS[1]!r} }});
-        window.jupyterapp.shell.currentWidget.content.activeCellIndex = 1;
+        const {{ content }} = window.jupyterapp.shell.currentWidget;
+        const place = content.model.sharedModel.cells.length;
+        content.model.sharedModel.insertCell(place, {{ cell_type: "code", source: {json.dumps(source)} }});
+        content.activeCellIndex = place;
         window.jupyterapp.commands.execute("notebook:run-cell");
     }}""")
+
+
+def test_python_flips_a_cell_too(widget):
+    run_cell(widget.page, "widget.toggle('not F2')")
     wait_for_text(widget, PLATE.replace("F2 = not", "F2 ="))
     assert drawn(widget) == expected(PLATE.replace("F2 = not", "F2 ="))
     assert switch(widget, "not F2").get_attribute("aria-pressed") == "false"
@@ -191,6 +200,24 @@ def test_dark_pages_keep_light_pictures(widget):
     page.screenshot(path=ROOT / "build" / "browser_stump_dark.png")
     background = "canvas => getComputedStyle(canvas).backgroundColor"
     assert widget.locator("canvas").first.evaluate(background) == "rgb(255, 255, 255)"
+
+
+@pytest.mark.parametrize("text", ["F1 = circle(radius=1.0)\nT = nothing\n", LARGE], ids=["no nodes", "large"])
+def test_another_stump_is_drawn(page, text, capsys):
+    widget = page.locator(".stump-widget")
+    run_cell(page, f"widget.stump = StumpWidget({text!r}).stump")
+    wait_for_text(widget, text)
+    page.wait_for_function("() => document.querySelector('.stump-widget').dataset.draws")
+    assert drawn(widget) == expected(text)
+    assert widget.get_by_role("button", name="Undo").is_disabled()
+    widget.evaluate(WATCH)
+    switch(widget, "not F1").click()
+    page.wait_for_function("() => window.drawn > window.clicked")
+    with capsys.disabled():
+        print(f"\n  click to picture: {page.evaluate('window.drawn - window.clicked'):.0f} ms")
+    assert drawn(widget) == expected(text.replace("F1 = ", "F1 = not "))
+    widget.scroll_into_view_if_needed()
+    page.screenshot(path=ROOT / "build" / f"browser_stump_{text.count(chr(10))}.png")
 
 
 def test_nothing_went_wrong_and_nothing_left_the_machine(page):

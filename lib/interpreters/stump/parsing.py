@@ -6,24 +6,22 @@
     T = S1                                                  the union of some S, joined by "|"; or "nothing"
 
 A primitive takes its sizes and, where they change something, translation= and rotation= (a quaternion w, x, y, z in
-space, an angle in radians in the plane). Nothing is ever evaluated.
+space, an angle in radians in the plane). A size may be negative: its sign does not count. Nothing is ever evaluated.
 """
 
-import math
 import re
 
 import torch
 
-from ..quoting import quoted
+from .calls import kinds, read_primitive
 from .errors import ProgramError
-from .primitives import KINDS, POSE, Primitive
-from .program import EVERYTHING, NOTHING, Stump
+from .lines import Piece
+from .primitives import Primitive
+from .program import EVERYTHING, MOST, NOTHING, Stump
 
-_STATEMENT = re.compile(r"\s*([FST])([0-9]*)\s*=\s*(.*?)\s*$")
-_PRIMITIVE = re.compile(r"(not\s+)?([A-Za-z_]\w*)\s*\((.*)\)$")
-_ARGUMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(\([^()]*\)|[^(),]*)\s*(?:,|$)")
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _LONGEST = 10_000_000  # characters; a stump of 256 primitives and nodes has about 300,000
+_NUMBERED = re.compile(r"([FST])([1-9][0-9]{0,8})?")
+_EXPECTED = "F1 = a primitive, S1 = F1 & … or T = S1 | …"
 
 
 def parse(text: str) -> Stump:
@@ -32,143 +30,101 @@ def parse(text: str) -> Stump:
         raise ProgramError(f"found a {type(text).__name__}", expected="a text")
     if len(text) > _LONGEST:
         raise ProgramError(f"the text has {len(text)} characters", expected=f"at most {_LONGEST}")
-    primitives, complement, nodes, united = [], [], [], None
-    row = 0
-    for row, raw in enumerate(text.splitlines(), start=1):
-        line = raw.partition("#")[0].rstrip()
-        if not line.strip():
-            continue
-        letter, number, body, column = _statement(line, row)
-        if united is not None:
-            raise ProgramError(f"{quoted(line.strip())} after T", row, 1, line.strip(), "nothing after T")
-        if letter == "F":
-            _check_number("F", number, len(primitives), row, bool(nodes))
-            outside, primitive = _primitive(body, row, column)
-            if primitives and primitive.dimensions != primitives[0].dimensions:
-                found = f"a {primitive.name} among primitives of {primitives[0].dimensions} dimensions"
-                raise ProgramError(found, row, column, primitive.name, _kinds(primitives[0].dimensions))
-            primitives.append(primitive)
-            complement.append(outside)
-        elif letter == "S":
-            _check_number("S", number, len(nodes), row)
-            nodes.append(_members(body, "&", "F", len(primitives), EVERYTHING, row, column))
+    reader, row = _Reader(), 0
+    for row, line in enumerate(text.removeprefix("\ufeff").splitlines(), start=1):
+        statement = Piece(line.partition("#")[0], row).cut(0)
+        if statement.text:
+            reader.read(statement)
+    return reader.stump(row)
+
+
+class _Reader:
+    """What was read so far."""
+
+    def __init__(self):
+        self.primitives: list[Primitive] = []
+        self.complement: list[bool] = []
+        self.nodes: list[list[int]] = []
+        self.united: list[int] | None = None
+
+    def read(self, statement: Piece) -> None:
+        """One more line. Raises ProgramError."""
+        before, equals, _ = statement.text.partition("=")
+        name, value = statement.cut(0, len(before)), statement.cut(len(before) + 1)
+        match = _NUMBERED.fullmatch(name.text)
+        if self.united is not None:
+            raise statement.error("stands after T", "nothing after T")
+        if not equals or match is None or (match[1] == "T") != (match[2] is None):
+            raise statement.error("is no statement", _EXPECTED)
+        if match[1] == "F":
+            self._add_primitive(name, value)
+        elif match[1] == "S":
+            _check_number(name, len(self.nodes))
+            self.nodes.append(_members(value, "&", "F", len(self.primitives), EVERYTHING))
+            if len(self.primitives) * len(self.nodes) > MOST:
+                found = f"makes {len(self.primitives)} x {len(self.nodes)} connections"
+                raise name.error(found, f"at most {MOST}")
         else:
-            united = _members(body, "|", "S", len(nodes), NOTHING, row, column)
-    if united is None:
-        raise ProgramError("the text ends", row + 1, 1, "", "T = S1 | …, the union")
-    if not primitives:
-        raise ProgramError("the stump has no primitives", 1, 1, "", "F1 = box(half=(0.5, 0.5, 0.5)), say")
-    intersection = torch.zeros(len(primitives), len(nodes), dtype=torch.bool)
-    for c, members in enumerate(nodes):
-        intersection[members, c] = True
-    union = torch.zeros(len(nodes), dtype=torch.bool)
-    union[united] = True
-    return Stump(tuple(primitives), torch.tensor(complement), intersection, union)
+            self.united = _members(value, "|", "S", len(self.nodes), NOTHING)
 
-
-def _statement(line: str, row: int) -> tuple[str, str, str, int]:
-    match = _STATEMENT.match(line)
-    if match is None or (match[1] == "T") != (match[2] == ""):
-        found = line.strip()
-        raise ProgramError(
-            f"{quoted(found)} is no statement", row, line.index(found) + 1, found, "F1 = …, S1 = … or T = …"
-        )
-    return match[1], match[2], match[3], match.start(3) + 1
-
-
-def _check_number(letter: str, number: str, before: int, row: int, late: bool = False) -> None:
-    if late:
-        raise ProgramError(f"{letter}{number} after the nodes", row, 1, letter + number, "primitives first")
-    if number != str(before + 1):
-        raise ProgramError(f"found {letter}{number:.20}", row, 1, letter + number, f"{letter}{before + 1}")
-
-
-def _kinds(dimensions: int | None = None) -> str:
-    return ", ".join(name for name, kind in KINDS.items() if dimensions in (None, kind.dimensions))
-
-
-def _primitive(body: str, row: int, column: int) -> tuple[bool, Primitive]:
-    match = _PRIMITIVE.match(body)
-    if match is None:
-        expected = "a primitive, such as sphere(radius=0.5), or not and a primitive"
-        raise ProgramError(f"{quoted(body)} is no primitive", row, column, body, expected)
-    if match[2] not in KINDS:
-        raise ProgramError(
-            f"{quoted(match[2])} is no primitive", row, column + match.start(2), match[2], _kinds()
-        )
-    kind, given, place = KINDS[match[2]], {}, 0
-    arguments = match[3]
-    while arguments[place:].strip():
-        start = column + match.start(3) + place
-        argument = _ARGUMENT.match(arguments, place)
-        if argument is None:
-            found = arguments[place:].strip()
-            raise ProgramError(f"{quoted(found)} is no argument", row, start, found, _form(kind))
-        key = argument[1]
-        if key not in _widths(kind) or key in given:
-            found = f"{kind.name} takes {key} once" if key in given else f"{kind.name} takes no {quoted(key)}"
-            raise ProgramError(found, row, start, key, _form(kind))
-        given[key] = _numbers(
-            argument[2], _widths(kind)[key], key, row, column + match.start(3) + argument.start(2)
-        )
-        place = argument.end()
-    needed = [key for key in kind.counts if key not in given and not _optional(kind, key)]
-    if needed:
-        found = f"{quoted(body)} has no {needed[0]}"
-        raise ProgramError(found, row, column, body, _form(kind))
-    if kind.dimensions == 3 and not any(given.get("rotation", [1])):
-        expected = "a quaternion w, x, y, z with a length, such as (1, 0, 0, 0)"
-        raise ProgramError(f"the rotation of {quoted(body)} is zero", row, column, body, expected)
-    return bool(match[1]), kind(**{key: v if len(v) > 1 else v[0] for key, v in given.items()})
-
-
-def _optional(kind: type[Primitive], key: str) -> bool:
-    return key in POSE or (key == "height" and kind.dimensions == 3)
-
-
-def _widths(kind: type[Primitive]) -> dict[str, int]:
-    return {**kind.counts, "translation": kind.dimensions, "rotation": 4 if kind.dimensions == 3 else 1}
-
-
-def _form(kind: type[Primitive]) -> str:
-    """How a primitive is written, its optional arguments in brackets."""
-    words = []
-    for key, width in _widths(kind).items():
-        word = f"{key}={'(' + ', '.join('·' * width) + ')' if width > 1 else '·'}"
-        words.append(f"[{word}]" if _optional(kind, key) else word)
-    return f"{kind.name}({', '.join(words)})"
-
-
-def _numbers(text: str, width: int, key: str, row: int, column: int) -> list[float]:
-    """`width` numbers, in round brackets where there is more than one."""
-    inner = text.strip()
-    words = inner[1:-1].split(",") if inner.startswith("(") else [inner]
-    values = []
-    for word in words:
-        if not _NUMBER.fullmatch(word.strip()) or not math.isfinite(value := float(word)):
-            raise ProgramError(
-                f"{quoted(word.strip())} in {key} is no finite number", row, column, word.strip()
+    def _add_primitive(self, name: Piece, value: Piece) -> None:
+        if self.nodes:
+            raise name.error("stands after the nodes", "all primitives first")
+        _check_number(name, len(self.primitives))
+        outside, primitive = read_primitive(value)
+        dimensions = self.primitives[0].dimensions if self.primitives else primitive.dimensions
+        if primitive.dimensions != dimensions:
+            raise value.error(
+                f"has {primitive.dimensions} dimensions, F1 has {dimensions}", kinds(dimensions)
             )
-        values.append(value)
-    if len(values) != width:
-        expected = "one number" if width == 1 else f"{width} numbers, ({', '.join('·' * width)})"
-        raise ProgramError(f"{key} is {quoted(inner)}", row, column, inner, expected)
-    return values
+        self.primitives.append(primitive)
+        self.complement.append(outside)
+
+    def stump(self, row: int) -> Stump:
+        """The whole stump; row: the last line. Raises ProgramError where something is missing."""
+        if not self.primitives:
+            raise ProgramError("the text has no primitives", row + 1, 1, "", "F1 = sphere(radius=0.5), say")
+        if self.united is None:
+            raise ProgramError("the text ends", row + 1, 1, "", "T = S1 | …, the union of nodes")
+        intersection = torch.zeros(len(self.primitives), len(self.nodes), dtype=torch.bool)
+        for column, members in enumerate(self.nodes):
+            intersection[members, column] = True
+        union = torch.zeros(len(self.nodes), dtype=torch.bool)
+        union[self.united] = True
+        return Stump(self.primitives, torch.tensor(self.complement), intersection, union)
 
 
-def _members(body: str, join: str, letter: str, count: int, empty: str, row: int, column: int) -> list[int]:
+def _check_number(name: Piece, before: int) -> None:
+    wanted = f"{name.text[0]}{before + 1}"
+    if name.text != wanted:
+        raise name.error("is out of order", f"{wanted}: numbers count from 1 without gaps")
+
+
+def _members(value: Piece, join: str, letter: str, count: int, empty: str) -> list[int]:
     """Which ones are named, counted from 0."""
-    if body == empty:
+    if value.text == empty:
         return []
-    members = []
-    for part in body.split(join):
-        word, place = part.strip(), column + len(part) - len(part.lstrip())
-        column += len(part) + 1
-        last = f"{letter}1 to {letter}{count}" if count else f"{quoted(empty)}: there is no {letter}1"
-        match = re.fullmatch(f"{letter}([1-9][0-9]{{0,8}})", word)
-        if match is None or int(match[1]) > count:
-            raise ProgramError(f"found {quoted(word)}", row, place, word, f"{last}, joined by {join}")
-        if int(match[1]) - 1 in members:
-            raise ProgramError(f"{word} stands twice", row, place, word, "each once")
-        members.append(int(match[1]) - 1)
-    return members
+    members: dict[int, None] = {}
+    for word in value.split(join):
+        number = _number(word, join, letter, count, empty)
+        if number in members:
+            raise word.error("stands twice", "each one once")
+        members[number] = None
+    return list(members)
+
+
+def _number(word: Piece, join: str, letter: str, count: int, empty: str) -> int:
+    """The place of one that is named, such as "F3". Raises ProgramError for everything else."""
+    match = _NUMBERED.fullmatch(word.text)
+    if match and match[1] == letter and match[2] and int(match[2]) <= count:
+        return int(match[2]) - 1
+    other = "|" if join == "&" else "&"
+    if other in word.text:
+        raise word.error(
+            f"is joined by {other}", f"{join}: S is an intersection (&) of F, T a union (|) of S"
+        )
+    if word.text.startswith("not"):
+        raise word.error("is complemented here", "the complement where the primitive stands: F1 = not …")
+    known = f"{letter}1 to {letter}{count}" if count > 1 else f"{letter}1" if count else ""
+    expected = f"{known}, joined by {join}, or {empty}" if known else f"{empty}: there is no {letter}1"
+    raise word.error("is no node here" if letter == "S" else "is no primitive here", expected)

@@ -45,7 +45,7 @@ def sample(
     if not isinstance(rng, np.random.Generator):
         expected = "a numpy Generator, such as np.random.default_rng(0)"
         raise ProgramError(f"found {rng!r:.40}", expected=expected)
-    if dimensions not in _GRID:
+    if whole(dimensions) not in _GRID:
         raise ProgramError(f"{dimensions!r:.40} dimensions", expected="2 or 3")
     if primitives is None:
         least = 2 if nodes is None else max(2, _checked(nodes, MOST_PRIMITIVES, "nodes"))

@@ -108,7 +108,7 @@ function build({ rows, columns, names, side }, primitives, flip) {
     at(2, `${columns + 4} / span ${count + 2}`, "stump-shape", make("small", { textContent: "T, the shape" }), shape),
   ];
   const size = columns > 8 ? 46 : columns > 5 ? 60 : 76;
-  const style = `--side: ${size}px; --nodes: ${columns}`;
+  const style = `--side: ${size}px; --nodes: ${Math.max(1, columns)}`;
   return { desk: make("div", { className: "stump-desk", style }, ...parts), switches, complements, nodes, shape };
 }
 

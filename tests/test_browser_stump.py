@@ -26,7 +26,7 @@ CELLS = [
 ]
 LARGE = "".join(
     [*(f"F{k} = circle(radius=0.2, translation=({k / 10}, {k % 3 / 10}))\n" for k in range(1, 13)),
-     *(f"S{c} = F{c} & F{c % 12 + 1}\n" for c in range(1, 13)),
+     *(f"S{c} = F{max(1, c - 1)} & F{c + (c == 1)}\n" for c in range(1, 13)),
      f"T = {' | '.join(f'S{c}' for c in range(1, 13))}\n"]
 )  # fmt: skip
 WATCH = """(root) => {

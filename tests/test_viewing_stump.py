@@ -217,18 +217,19 @@ def test_a_cloud_has_a_legend_with_counts():
 
 def test_a_search_has_a_curve_a_method():
     rows = [
-        {"primitives": k, "method": method, "objective": 0.1 / k, "seconds": k / 10, "bound": 0.0}
-        for method in ("greedy", "program")
+        {"primitives": k, "search": search, "wrong_percent": 10 / k, "bound_percent": 0.0, "seconds": k / 10}
+        for search in ("layers", "solve", "greedy")
         for k in (16, 4, 8)
     ]
-    wrong, slow = search_figure(rows, limit=2).axes
+    wrong, slow = search_figure({"rows": rows, "limit_seconds": 2.0}).axes
     assert wrong.lines[0].get_xdata().tolist() == [4, 8, 16]
     assert wrong.lines[0].get_ydata() == pytest.approx([2.5, 1.25, 0.625])
-    assert [text.get_text() for text in wrong.get_legend().get_texts()] == ["greedy cover", "binary program"]
+    names = [text.get_text() for text in wrong.get_legend().get_texts()]
+    assert names == ["paper's program", "our search", "not proven", "greedy cover"]
     assert (
         len(wrong.collections) == 1
         and slow.get_yscale() == "log"
         and "time limit" in slow.texts[0].get_text()
     )
     with pytest.raises(ValueError, match="found no rows"):
-        search_figure([])
+        search_figure({"rows": [], "limit_seconds": 2.0})

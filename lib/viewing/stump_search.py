@@ -1,34 +1,41 @@
-"""A search for a stump's matrices, measured: how good they are and how long it takes as the primitives become more."""
+"""Searches for a stump's matrices, measured: how good they are and how long they take as the primitives become more."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-_STYLES = {"program": ("#0072b2", "o"), "greedy": ("#e08700", "s")}
-_OTHER = ("#009e73", "^")
-_LABEL = {"program": "binary program", "greedy": "greedy cover"}
+from lib.viewing.canvas import SOFT
+
+# search -> what it is called, its colour and marker
+_CURVES = {
+    "layers": ("paper's program", "#009e73", "^"),
+    "solve": ("our search", "#0072b2", "o"),
+    "greedy": ("greedy cover", "#e08700", "s"),
+}
+_BOUNDED = "solve"  # the search whose lower bound is drawn: it is the best one that is proven
 
 
-def search_figure(rows: Sequence[Mapping], limit: float | None = None) -> Figure:
-    """Share of wrong points (left) and seconds (right) against the number of primitives K, a curve a method.
+def search_figure(found: Mapping) -> Figure:
+    """Share of wrong points (left) and seconds (right) against the number of primitives K, a curve a search.
 
-    rows   such as {"primitives": 16, "method": "program", "objective": 0.02, "seconds": 1.5}, and perhaps a "bound":
-           no matrices can be less wrong, and what lies between is shaded.
-    limit  seconds that a search may take, drawn as a line.    Raises ValueError for no rows.
+    found: results/stump_search.json, which `python -m data_scripts.measure_stump_search` writes: its "rows" and
+    "limit_seconds". What is shaded lies between our search's answer and what is proven: no matrices are better than
+    the lower edge. Raises ValueError for no rows.
     """
+    rows = found["rows"]
     if not rows:
         raise ValueError("found no rows; expected one or more")
-    figure, (wrong, slow) = plt.subplots(1, 2, figsize=(8, 3), dpi=100)
+    figure, (wrong, slow) = plt.subplots(1, 2, figsize=(8, 3.2), dpi=100)
     plt.close(figure)
-    for method in dict.fromkeys(row["method"] for row in rows):
-        mine = sorted((row for row in rows if row["method"] == method), key=_primitives)
-        _curves(wrong, slow, method, mine)
-    if limit is not None:
-        slow.axhline(limit, color="#667080", linewidth=1, linestyle=(0, (4, 3)))
-        slow.annotate("time limit", (0.02, limit), xycoords=("axes fraction", "data"), xytext=(0, 3),
-                      textcoords="offset points", fontsize=8, color="#667080")  # fmt: skip
+    for search in dict.fromkeys(row["search"] for row in rows):
+        _curves(
+            wrong, slow, search, sorted((row for row in rows if row["search"] == search), key=_primitives)
+        )
+    slow.axhline(found["limit_seconds"], color=SOFT, linewidth=1, linestyle=(0, (4, 3)))
+    place = {"xycoords": ("axes fraction", "data"), "xytext": (0, 3), "textcoords": "offset points"}
+    slow.annotate("time limit", (0.02, found["limit_seconds"]), fontsize=8, color=SOFT, **place)
     slow.set_yscale("log")
     for ax, label in ((wrong, "wrong points, %"), (slow, "seconds")):
         _dress(ax, sorted({_primitives(row) for row in rows}), label)
@@ -38,15 +45,15 @@ def search_figure(rows: Sequence[Mapping], limit: float | None = None) -> Figure
     return figure
 
 
-def _curves(wrong: Axes, slow: Axes, method: str, rows: list[Mapping]) -> None:
-    color, marker = _STYLES.get(method, _OTHER)
+def _curves(wrong: Axes, slow: Axes, search: str, rows: list[Mapping]) -> None:
+    label, color, marker = _CURVES[search]
     style = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.6}
-    counts, objectives = [_primitives(row) for row in rows], [100 * row["objective"] for row in rows]
-    wrong.plot(counts, objectives, label=_LABEL.get(method, method), **style)
+    counts, percents = [_primitives(row) for row in rows], [row["wrong_percent"] for row in rows]
+    wrong.plot(counts, percents, label=label, **style)
     slow.plot(counts, [row["seconds"] for row in rows], **style)
-    if method != "greedy" and all("bound" in row for row in rows):  # a greedy cover proves next to nothing
-        bounds = [100 * row["bound"] for row in rows]
-        wrong.fill_between(counts, bounds, objectives, color=color, alpha=0.15, linewidth=0)
+    if search == _BOUNDED:
+        bounds = [row["bound_percent"] for row in rows]
+        wrong.fill_between(counts, bounds, percents, color=color, alpha=0.15, linewidth=0, label="not proven")
 
 
 def _primitives(row: Mapping) -> int:
@@ -54,8 +61,14 @@ def _primitives(row: Mapping) -> int:
 
 
 def _dress(ax: Axes, counts: list[int], label: str) -> None:
+    """K on a scale of doublings; only those numbers are written that have room, the others get a tick."""
     ax.set_xscale("log", base=2)
-    ax.set_xticks(counts, map(str, counts))
+    written, last = [], 0.0
+    for count in counts:
+        roomy = count >= 1.3 * last
+        written.append(str(count) if roomy else "")
+        last = count if roomy else last
+    ax.set_xticks(counts, written)
     ax.minorticks_off()
     ax.set(xlabel="primitives K", ylabel=label)
     ax.spines[["top", "right"]].set_visible(False)

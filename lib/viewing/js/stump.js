@@ -35,14 +35,10 @@ function layersOf(primitives, columns, cells) {
 function print(canvas, bits, color) {
   const pen = canvas.getContext("2d");
   const image = pen.createImageData(canvas.width, canvas.height);
-  const [red, green, blue] = [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16));
-  for (let pixel = 0; pixel < canvas.width * canvas.height; pixel++)
-    if ((bits[pixel >> 3] >> (pixel & 7)) & 1) {
-      image.data[4 * pixel] = red;
-      image.data[4 * pixel + 1] = green;
-      image.data[4 * pixel + 2] = blue;
-      image.data[4 * pixel + 3] = 255;
-    }
+  const dots = new Uint32Array(image.data.buffer); // a pixel's red, green, blue and opacity are the bytes of a number
+  const rgb = [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16));
+  const [dot] = new Uint32Array(Uint8Array.of(...rgb, 255).buffer);
+  for (let pixel = 0; pixel < dots.length; pixel++) if ((bits[pixel >> 3] >> (pixel & 7)) & 1) dots[pixel] = dot;
   pen.putImageData(image, 0, 0);
 }
 
@@ -75,8 +71,8 @@ function build({ rows, columns, names, side }, primitives, flip) {
   const at = (row, column, className, ...children) =>
     make("div", { className, style: `grid-area: ${row} / ${column}` }, ...children);
   const paper = (ariaLabel) => make("canvas", { width: side, height: side, role: "img", ariaLabel });
-  const node = (row, column, name, canvas, text = name, title = "") =>
-    Object.assign(at(row, column, "stump-node", canvas, make("small", { textContent: text })), { title });
+  const node = (row, column, textContent, canvas, title = "") =>
+    Object.assign(at(row, column, "stump-node", canvas, make("small", { textContent })), { title });
   const papers = (letter, many) => Array.from({ length: many }, (_, k) => paper(`${letter}${k + 1}`));
   const [inputs, complements, nodes] = [papers("O", count), papers("F", count), papers("S", columns)];
   const shape = paper("T, the shape");
@@ -95,19 +91,21 @@ function build({ rows, columns, names, side }, primitives, flip) {
     const className = Object.keys(marks).filter((mark) => marks[mark]).join(" ");
     return at(row === count ? count + 3 : row + 2, column ? column + 3 : 2, className, button);
   });
-  const heads = ["primitives", "W_C", "complement"].map((text, k) => at(1, k + 1, "stump-head", text));
+  const size = columns > 8 ? 46 : columns > 5 ? 60 : 76;
+  const wordy = size === 76; // else there is room for names only
+  const words = wordy ? ["primitives", "W_C", "complement"] : ["O", "W_C", "F"];
+  const heads = words.map((text, k) => at(1, k + 1, "stump-head", text));
   if (columns) heads.push(at(1, `4 / auto / span ${columns}`, "stump-head", "W_I"));
   const says = [["S, intersections: where all dotted F of a column are", 2], ["W_U, which S are united", 3]].map(
     ([text, row]) => at(count + row, "1 / span 1 / span 3", "stump-says", text),
   );
   const parts = [
     ...heads, ...says, ...crossings,
-    ...inputs.map((canvas, k) => node(k + 2, 1, `O${k + 1}`, canvas, `O${k + 1} ${rows[k].name}`, rows[k].title)),
+    ...inputs.map((canvas, k) => node(k + 2, 1, `O${k + 1}${wordy ? " " + rows[k].name : ""}`, canvas, rows[k].title)),
     ...complements.map((canvas, k) => node(k + 2, 3, `F${k + 1}`, canvas)),
     ...nodes.map((canvas, c) => node(count + 2, c + 4, `S${c + 1}`, canvas)),
     at(2, `${columns + 4} / span ${count + 2}`, "stump-shape", make("small", { textContent: "T, the shape" }), shape),
   ];
-  const size = columns > 8 ? 46 : columns > 5 ? 60 : 76;
   const style = `--side: ${size}px; --nodes: ${Math.max(1, columns)}`;
   return { desk: make("div", { className: "stump-desk", style }, ...parts), switches, complements, nodes, shape };
 }

@@ -8,13 +8,6 @@ import torch
 
 from data_scripts import measure_stump_search
 from data_scripts.measure_stump_search import NOISE, POINTS, RESULT, SEARCHES, planted
-from tests.conftest import unchecked
-
-
-@pytest.fixture(scope="module", autouse=True)
-def quick():
-    with unchecked():
-        yield
 
 
 @pytest.fixture

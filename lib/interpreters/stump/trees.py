@@ -26,7 +26,7 @@ from .primitives import Primitive
 from .program import EVERYTHING, NOTHING, Stump, check_primitives
 from .terms import intersected, literals, shortened, united
 
-MOST_TERMS = 1 << 14  # that one step may make: about as many as two cores compare in a tenth of a second
+MOST_TERMS = 1 << 14  # that one step may make; the paper has 256 nodes
 COUNTED = 10**100  # no further: subtrees that stand in several places could make numbers that fill the memory
 
 

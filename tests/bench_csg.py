@@ -11,6 +11,7 @@ import torch
 
 from lib.interpreters.csg import execute, execute_many, parse, sample_many, vocabulary_of
 from tests.csg_programs import random_mixture, random_program
+from tests.timing import timed
 
 AUTHORS = {2: 1 / 466, 3: 1 / 5}  # seconds a program
 LENGTHS = {2: (3, 5, 7, 9, 11, 13), 3: (3, 5, 7)}
@@ -30,18 +31,10 @@ def tokens() -> dict[int, torch.Tensor]:
 
 @pytest.fixture
 def bench(benchmark):
-    """Times a function and notes what it stands for: bench(function, what, how many programs, the authors' seconds)."""
+    """bench(function, what, how many programs, rounds, the authors' seconds)"""
 
     def run(function, what: str, count: int = 1, rounds: int = 7, authors: float | None = None):
-        result = benchmark.pedantic(function, rounds=rounds, warmup_rounds=2)
-        benchmark.extra_info.update(what=what, count=count, authors_seconds_each=authors, data=DATA)
-        benchmark.extra_info.update(torch=torch.__version__, threads=torch.get_num_threads())
-        if benchmark.stats:  # absent where benchmarks are only run, not timed
-            each = benchmark.stats.stats.median / count
-            benchmark.extra_info.update(programs_per_second=1 / each)
-            if authors:
-                benchmark.extra_info.update(times_faster=authors / each)
-        return result
+        return timed(benchmark, function, what, data=DATA, count=count, rounds=rounds, authors=authors)
 
     return run
 

@@ -37,6 +37,8 @@ def rows(benchmarks: list[dict]) -> list[dict]:
                 "authors_milliseconds": rounded(1000 * authors),
                 "times_faster": rounded(authors / seconds),
             }
+        if info.get("peak_megabytes"):
+            row |= {key: rounded(info[key]) for key in ("peak_megabytes", "authors_megabytes")}
         table.append(row | {"data": info["data"], "torch": info["torch"], "threads": info["threads"]})
     return table
 

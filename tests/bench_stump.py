@@ -11,6 +11,7 @@ import torch
 from lib.interpreters.stump import execute, execute_many
 from lib.interpreters.stump.surface import field
 from tests.random_stumps import boxes, random_stump
+from tests.timing import timed
 
 FIELD, SURFACE = 41.7, 41.9  # seconds the authors' program takes
 UNIT = [[-0.5] * 3, [0.5] * 3]
@@ -19,18 +20,11 @@ DATA = "64 random boxes, 20 nodes"
 
 @pytest.fixture
 def bench(benchmark):
-    """Times a function and notes what it stands for: bench(function, what, how many stumps, the authors' seconds)."""
+    """bench(function, what, how many stumps, the authors' seconds)"""
+    torch.set_num_threads(1)
 
-    def run(function, what: str, count: int = 1, rounds: int = 5, authors: float | None = None, data=DATA):
-        result = benchmark.pedantic(function, rounds=rounds, warmup_rounds=1)
-        benchmark.extra_info.update(what=what, count=count, authors_seconds_each=authors, data=data)
-        benchmark.extra_info.update(torch=torch.__version__, threads=torch.get_num_threads())
-        if benchmark.stats:  # absent where benchmarks are only run, not timed
-            each = benchmark.stats.stats.median / count
-            benchmark.extra_info.update(programs_per_second=1 / each)
-            if authors:
-                benchmark.extra_info.update(times_faster=authors / each)
-        return result
+    def run(function, what: str, count: int = 1, authors: float | None = None, data=DATA):
+        return timed(benchmark, function, what, data=data, count=count, authors=authors)
 
     return run
 

@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from lib.interpreters.stump import layers
+from tests.timing import timed
 
 AUTHORS = 5.0  # seconds
 STATUS, RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
@@ -56,9 +57,8 @@ def _kilobytes(key: str) -> int:
 @pytest.mark.parametrize("temperature", [None, 20.0])
 def test_forward_and_backward(benchmark, temperature):
     torch.set_num_threads(1)
-    gradients = benchmark.pedantic(step, args=(drawn(), temperature), rounds=7, warmup_rounds=1)
-    kind = "exact" if temperature is None else "smooth"
-    benchmark.extra_info.update(what=f"layers forward and backward, {kind}", count=1, data=DATA)
-    benchmark.extra_info.update(authors_seconds_each=AUTHORS, torch=torch.__version__, threads=1)
+    inputs = drawn()
+    what = f"forward and backward, {'exact' if temperature is None else 'smooth'}"
+    gradients = timed(benchmark, lambda: step(inputs, temperature), what, data=DATA, authors=AUTHORS)
     benchmark.extra_info.update(peak_megabytes=peak_megabytes(temperature), authors_megabytes=1500)
     assert all(gradient.isfinite().all() for gradient in gradients)

@@ -4,6 +4,7 @@
     graphs = part_graphs("chair")                      a sequence of PartGraph
     random = csg_programs(2, split="train")            a sequence of CSG Program, and all their tokens
     masks = silhouettes(split="train")                 64x64 masks of furniture, without programs; logos() likewise
+    mug = solid("mug")                                 one of ten everyday solids, as a tree of operations
     chairs.source                                      "real", "made" or "embedded"
     print(chairs.describe())                           one sentence for the reader
 
@@ -21,9 +22,10 @@ from .graphs import GraphSet, part_graphs
 from .images import SOURCES as IMAGE_SOURCES
 from .images import ImageSet, logos, silhouettes
 from .programs import SPLITS, ProgramSet, example, example_text, examples, shapeassembly, vary
+from .solids import SOLIDS, solid
 
 __all__ = [
-    "CATEGORIES", "CSG_SIZES", "CSG_SPLITS", "IMAGE_SOURCES", "REPOSITORY", "SPLITS", "DataError", "DataSet",
+    "CATEGORIES", "CSG_SIZES", "CSG_SPLITS", "IMAGE_SOURCES", "REPOSITORY", "SOLIDS", "SPLITS", "DataError", "DataSet",
     "GraphSet", "ImageSet", "ProgramSet", "TokenSet", "csg_programs", "data_root", "example", "example_text",
-    "examples", "logos", "part_graphs", "shapeassembly", "silhouettes", "vary",
+    "examples", "logos", "part_graphs", "shapeassembly", "silhouettes", "solid", "vary",
 ]  # fmt: skip

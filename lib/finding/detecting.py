@@ -43,8 +43,8 @@ class Options:
     tolerance: float | None = None
     angle: float | None = None
     fewest: float = 0.004
-    trials: int = 200
-    patience: int = 6
+    trials: int = 300
+    patience: int = 12
 
 
 def detect(cloud: PointCloud, seed: int, options: Options | None = None) -> list[Surface]:

@@ -5,7 +5,7 @@ each cloud point p_i and its outward normal n_i,
 
     w(x) = sum_i a_i n_i . (p_i - x) / (4 pi |p_i - x|^3)          about 1 inside, about 0 outside
 
-(Barill et al. 2018, Fast winding numbers for soups and clouds, equation 6).
+(Barill et al. 2018, Fast winding numbers for soups and clouds).
 """
 
 from dataclasses import dataclass

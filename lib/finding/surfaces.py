@@ -120,7 +120,7 @@ def through(
     kind: str, points: Float[np.ndarray, "h 3 3"], normals: Float[np.ndarray, "h 3 3"]
 ) -> Float[np.ndarray, "h p"]:
     """The surface through each three points (h, which, xyz) and their normals; where there is none, numbers that are
-    not finite. Schnabel et al. 2007, section 4.1."""
+    not finite. Schnabel et al. 2007."""
     with np.errstate(all="ignore"):
         return _THROUGH[kind](points, normals)
 

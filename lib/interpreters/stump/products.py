@@ -19,7 +19,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-STEEPEST = 160.0  # highest temperature: beyond it, exp leaves the range of float32
+STEEPEST = 120.0  # highest temperature: far beyond it, sums of exp leave the range of float32
 _CACHE = 1 << 17  # numbers of a block on a processor: half a megabyte
 _CARD = 1 << 26  # and on a graphics card, which wants large ones
 
@@ -29,10 +29,15 @@ def max_product(
 ) -> Float[Tensor, "*n c m"]:
     """max over k of w_kc g_km, exact or, with a temperature, smooth; differentiable once in w and in g.
 
-    w and g lie in [0, 1]. K = 0 gives 0. Raises ValueError for a temperature that is not in (0, STEEPEST].
+    w and g lie in [0, 1]. K = 0 gives 0. The result has the wider one's dtype, at least float32.
+    Raises ValueError for a temperature that is not in (0, STEEPEST], and for w and g of different K.
     """
     if temperature is not None and not 0 < temperature <= STEEPEST:
         raise ValueError(f"found a temperature of {temperature}; expected more than 0, at most {STEEPEST:g}")
+    if w.shape[-2] != g.shape[-2]:
+        raise ValueError(f"found w with K = {w.shape[-2]} and g with K = {g.shape[-2]}; expected the same")
+    dtype = torch.promote_types(torch.promote_types(w.dtype, g.dtype), torch.float32)
+    w, g = w.to(dtype), g.to(dtype)
     batch = torch.broadcast_shapes(w.shape[:-2], g.shape[:-2])
     if not w.shape[-2]:
         return g.new_zeros(*batch, w.shape[-1], g.shape[-1])

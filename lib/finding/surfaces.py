@@ -20,6 +20,7 @@ KINDS = ("plane", "sphere", "cylinder", "cone")  # simple ones first
 WIDTHS = {"plane": 6, "sphere": 4, "cylinder": 7, "cone": 7}
 FITTED = 600  # points that a fit looks at
 EVALUATIONS = 30  # steps of a fit
+TINY = 1e-12  # share of the longest of some vectors: shorter ones have no direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,4 +203,6 @@ def _meeting(p, u, q, v) -> np.ndarray:
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:
-    return np.maximum(np.sqrt((vectors**2).sum(-1)), 1e-12)
+    """None is 0, so that all can be divided by; how small the least ones are depends on no unit."""
+    lengths = np.sqrt((vectors**2).sum(-1))
+    return np.maximum(lengths, TINY * lengths.max(initial=0.0) or 1.0)

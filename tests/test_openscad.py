@@ -1,5 +1,7 @@
 """OpenSCAD files as texts: what is written is read back exactly, edits are read as edits, all else is refused."""
 
+import re
+
 import numpy as np
 import pytest
 import torch
@@ -214,7 +216,7 @@ def refused(text: str) -> ScadError:
         ("module F1()", "module F1(x)", "the function or the parameters of 'F1'", "without parameters"),
         ("module F1()", "module G()", "module 'G'", "F1, F2"),
         ("module F1()", "module union()", "'union' is OpenSCAD's own", "another name"),
-        ("endless =", "PI =", "'PI' is OpenSCAD's own", "another name"),
+        ("F1_height =", "PI =", "'PI' is OpenSCAD's own", "another name"),
         ("module placed(translation", "module placed(shift", "'placed' is not as we write it", "unchanged"),
         ("2 * abs(half[0])", "abs(half[0])", "'box_of' is not as we write it", "unchanged"),
         ("box_of(F3_half)", "square_of(F3_half)", "'square_of' has no definition", "helper"),
@@ -234,6 +236,80 @@ def test_what_is_not_in_the_subset_is_refused_by_name_and_place(old, new, found,
     assert any(part in str(error) for part in found.split("|")), str(error)
     assert expected in error.expected
     assert error.line and error.column, str(error)
+
+
+def with_parameter(text: str, name: str, value: str) -> str:
+    """The text, a parameter's line changed."""
+    changed, count = re.subn(rf"(?m)^{re.escape(name)} = .*$", lambda _: value, text)
+    assert count == 1
+    return changed
+
+
+@pytest.mark.parametrize("name", ["language", "$fn", "window_low", "F1_radius", "F3_half", "F4_rotation"])
+def test_a_small_text_of_a_huge_value_is_refused_at_once(name, time_limit):
+    """Each vector holds the one above it twice; whoever looks at all of the last one never ends."""
+    huge = "a0 = [1];" + "".join(f"a{k + 1} = [a{k}, a{k}];" for k in range(60))
+    with unchecked(), time_limit(5):
+        error = refused(with_parameter(stump.parse(MUG).to_openscad(), name, f"{huge} {name} = a60;"))
+    assert "a vector of 2" in str(error) and error.line
+
+
+def test_long_files_take_time_in_proportion(unchecked_shapes, time_limit):
+    with time_limit(30):  # copying the rest of the file for every statement took ten times that
+        assert len(parse("a = 1;" * 100_000).statements) == 100_000
+
+
+@pytest.mark.parametrize("value", ["", "$fn = 0;", '$fn = "a";', "$fn = 2;", "$fn = 4.5;", "$fn = [9];"])
+def test_corners_of_circles_are_a_whole_number(value):
+    for shape in (stump.parse(MUG), csg.parse("c(9,9,9)")):
+        error = refused(with_parameter(shape.to_openscad(), "$fn", value))
+        assert "$fn" in str(error) and "a whole number, at least 3" in error.expected
+
+
+@pytest.mark.parametrize(
+    "name, value, found",
+    [
+        ("window_low", "", "no parameter 'window_low'"),
+        ("window_high", "", "no parameter 'window_high'"),
+        ("window_low", "window_low = 3;", "the number 3"),
+        ("window_low", "window_low = [-9, 9, -9];", "window_low is 9 in y"),
+        ("height", "", "no parameter 'height'"),
+        ("height", "height = 0;", "height is the number 0"),
+    ],
+)  # fmt: skip
+def test_windows_and_plates_have_a_size(name, value, found):
+    shape = stump.parse(FLAT if name == "height" else MUG)
+    assert found in str(refused(with_parameter(shape.to_openscad(), name, value)))
+
+
+def test_endless_names_all_that_the_shape_has(unchecked_shapes):
+    text = stump.parse(MUG).to_openscad()
+    start = text.index("function endless")
+    head, tail = text[:start], text[start:]
+    assert read(head + tail.replace("F4_translation", "F4_translation, 3 * 4", 1)) == stump.parse(MUG)
+    for old, new in [
+        ("F3_half, ", ""),
+        ("2 * norm", "norm"),
+        ("norm", "sqrt"),
+        ("F3_half", "$fn, language"),
+    ]:
+        error = refused(head + tail.replace(old, new, 1))
+        assert "endless()" in str(error) and error.line
+    assert "no function 'endless'" in str(refused(re.sub("function endless[^;]*;", "", text)))
+    wide = stump.parse("F1 = cone(slope=1e200, height=1e200)\nF2 = cylinder(radius=1)\nS1 = F1 & F2\nT = S1")
+    with pytest.raises(ScadError, match="farther than any number"):
+        write(wide)
+
+
+def test_a_helper_that_another_one_needs_is_missed():
+    text = stump.parse(MUG).to_openscad()
+    assert "'swollen' has no definition" in str(refused(re.sub("function swollen.*", "", text)))
+
+
+def test_marks_of_other_systems():
+    text = stump.parse(MUG).to_openscad()
+    assert read("\ufeff" + text) == read(text.replace("\n", "\r\n")) == stump.parse(MUG)
+    assert "a carriage return alone" in str(refused(text.replace("\n", "\r")))
 
 
 def test_an_error_points_at_the_number_that_is_wrong():
@@ -289,6 +365,9 @@ def test_parts_that_no_file_can_hold(names, found):
 
 
 def test_what_is_no_text_and_no_shape(unchecked_shapes):
+    for names in (None, ("a",)):
+        with pytest.raises(ScadError, match="and a NoneType"):
+            Parts(names, None)
     for call in (read, write):
         with pytest.raises(ScadError, match="found a int"):
             call(3)

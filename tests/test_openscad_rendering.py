@@ -135,6 +135,23 @@ def test_an_edit_means_to_openscad_what_it_means_to_us(rendered):
     assert_same_solid(rendered(text), stump.execute(read(text)).mesh())
 
 
+def test_what_goes_on_for_ever_still_does_after_edits(rendered):
+    """A hole through a block that was made long and moved away; its quaternions are tiny and huge."""
+    text = stump.parse(STUMPS["a plate with a turned hole, the paper's endless cylinder"]).to_openscad()
+    for name, value in {
+        "F1_half": "[0.5, 0.3, 40]",
+        "F1_translation": "[30, 0, 0]",
+        "F1_rotation": "[1e-200, 0, 0, 0]",
+        "F2_translation": "[30, 0, -70]",
+        "F2_rotation": "[1e200, 0, 0, 0]",
+    }.items():
+        text, count = re.subn(rf"(?m)^{name} = .*$", f"{name} = {value};", text)
+        assert count == 1
+    theirs = rendered(text)
+    assert theirs.volume == pytest.approx(80 * (0.6 - np.pi * 0.2**2), rel=1e-3)
+    assert theirs.euler_number == 0  # the hole goes through
+
+
 def test_openscad_rounds_corners_as_we_do(tmp_path):
     """At every center and radius: half a pixel in one of them would go unseen in a volume."""
     scad, found = tmp_path / "corners.scad", tmp_path / "corners.echo"

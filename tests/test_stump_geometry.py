@@ -264,7 +264,7 @@ def test_a_plate_with_a_hole():
     shape = single(Box((0.5, 0.4, 0.1)), Cylinder(0.2), complement=[0, 1])
     points = [[0.3, 0, 0], [0, 0, 0], [0.5, 0.4, 0.1], [0.6, 0, 0], [0.3, 0, math.nan], [math.inf, 0, 0]]
     assert shape.occupancy(points).tolist() == [True, False, True, False, False, False]
-    assert isinstance(shape, Solid) and repr(shape) == "Solid(Stump(2 primitives, 1 nodes, 1 united))"
+    assert isinstance(shape, Solid) and repr(shape) == "Solid(Stump(2 primitives, 1 node, 1 united))"
 
 
 def test_points_that_are_not_finite_are_in_no_complement():
@@ -318,6 +318,7 @@ def test_many_are_as_one(dimensions, unchecked_shapes, monkeypatch):
 def test_no_stumps_at_all():
     shapes = execute_many([])
     assert len(shapes) == 0 and shapes.occupancy(torch.zeros(5, 3)).shape == (0, 5)
+    assert shapes.occupancy(torch.zeros(5, 2)).shape == (0, 5)
 
 
 def test_soft_occupancy_tends_to_the_hard_one():
@@ -387,6 +388,13 @@ def test_messages_of_execution(unchecked_shapes, ask, message):
         (lambda s, p: s.nodes(None), "a NoneType; expected points"),
         (lambda s, p: s.soft_occupancy([["1"] * 3]), "a list; expected points"),
         (lambda s, p: execute_many([s.program]).occupancy(np.ones((4, 3)) * 1j), "complex points; expected"),
+        (lambda s, p: execute_many([]).occupancy(None), "a NoneType; expected points"),
+        (
+            lambda s, p: s.soft_occupancy([[0.0] * 3], "a"),
+            "a sharpness of 'a'; expected a finite number above 0",
+        ),
+        (lambda s, p: s.soft_occupancy([[0.0] * 3], math.nan), "a sharpness of nan"),
+        (lambda s, p: s.soft_occupancy([[0.0] * 3], -1.0), "a sharpness of -1.0"),
         (lambda s, p: s.voxels(0), "a resolution of 0; expected a whole number, at least 1"),
         (lambda s, p: s.voxel_centers(2.5), "a resolution of 2.5"),
         (lambda s, p: p.image(True), "a resolution of True"),

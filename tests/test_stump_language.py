@@ -10,8 +10,23 @@ import torch
 
 from lib.datasets import examples
 from lib.interpreters import csg, shapeassembly
+from lib.interpreters import stump as language
 from lib.interpreters.csg.geometry import occupancy as csg_occupancy
-from lib.interpreters.stump import Circle, HalfPlane, ProgramError, Sphere, Stump, execute, parse, sample
+from lib.interpreters.stump import (
+    Box,
+    Circle,
+    Cone,
+    Cylinder,
+    HalfPlane,
+    ProgramError,
+    Sphere,
+    Square,
+    Stump,
+    Triangle,
+    execute,
+    parse,
+    sample,
+)
 from lib.interpreters.stump.converting import EDGE, csg_tree, shapeassembly_tree
 from tests.conftest import unchecked
 from tests.csg_programs import mask, pixels_of, random_program
@@ -205,6 +220,156 @@ def test_mutants_are_read_or_refused(unchecked_shapes):
             assert parse(stump.to_text()) == stump
             read += 1
     assert MUTANTS / 40 < read < MUTANTS / 2
+
+
+# What stumps are built of.
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda: Sphere(None), "a sphere has no radius"),
+        (lambda: Triangle(0.1, None, 0.3), "a triangle has no right"),
+        (lambda: Triangle(0.1, 0.2, None), "a triangle has no height"),
+        (lambda: Cone(None, 1.0), "a cone has no slope"),
+        (lambda: Box(None), "a box has no half"),
+        (lambda: Square(None), "a square has no half"),
+        (lambda: Sphere(torch.tensor(1j)), "expected real numbers"),
+        (lambda: Sphere(np.array(1j)), "expected real numbers"),
+        (lambda: Sphere(torch.ones(1).to_sparse()), "expected real numbers, not sparse"),
+        (lambda: Sphere(10**400), "a number that is too large"),
+        (lambda: Sphere(10**5000), "a number that is too large"),
+        (lambda: Sphere("a"), "found 'a'; expected numbers"),
+        (
+            lambda: Cylinder(torch.ones(2), torch.ones(3)),
+            r"height of a cylinder is a batch of shape \(3,\).* \(2,\)",
+        ),
+        (lambda: Sphere(torch.ones(2), torch.ones(3, 3)), "translation of a sphere is a batch"),
+        (lambda: Circle(torch.ones(5), rotation=torch.ones(4)), "rotation of a circle is a batch"),
+        (lambda: Box(0.5), r"half of a box has the shape \(\); expected 3 numbers"),
+        (lambda: Box.from_paper(torch.rand(8)), "for a box; expected 10: rotation, translation, half"),
+        (lambda: Box.from_paper(torch.rand(9)), "for a box; expected 10"),
+        (lambda: Sphere.from_paper(torch.rand(7)), "for a sphere; expected 8"),
+        (
+            lambda: Cone.from_paper(torch.rand(10)),
+            "for a cone; expected 9: rotation, translation, slope, height",
+        ),
+        (
+            lambda: Sphere(0.5).with_numbers(torch.rand(7)),
+            "for a sphere; expected 8: radius, translation, rotation",
+        ),
+    ],
+)
+def test_what_is_no_primitive(make, words):
+    with unchecked(), pytest.raises(ProgramError, match=words):
+        make()
+
+
+@pytest.mark.parametrize(
+    "number", [torch.tensor(2), torch.tensor(True), np.float32(2), np.array([4, 2])[::-1]]
+)
+def test_whole_numbers_become_floats(number):
+    with unchecked():
+        sphere = Sphere(number)
+    assert all(getattr(sphere, key).dtype == torch.float64 for key in sphere.written)
+    assert sphere.distance(torch.zeros(1, 3)).flatten()[0] == -float(sphere.radius.flatten()[0])
+
+
+def test_floating_tensors_keep_their_type_and_their_gradient():
+    radius = torch.tensor(0.5, dtype=torch.float32, requires_grad=True)
+    assert Sphere(radius).radius is radius and Sphere(radius).rotation.dtype == torch.float32
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_numbers_follow_the_tensors_beside_them(dtype):
+    for sphere in (Sphere(0.1, torch.zeros(3, dtype=dtype)), Sphere(torch.ones(2, dtype=dtype), [0.1, 0, 0])):
+        assert all(getattr(sphere, key).dtype == dtype for key in sphere.written)
+        assert sphere.distance(torch.zeros(1, 3)).dtype == dtype
+
+
+@pytest.mark.parametrize(
+    "make, batch",
+    [
+        (lambda: Sphere(0.5, translation=[[0, 0, 0]]), (1,)),
+        (lambda: Sphere([0.5, 0.6], [0, 0, 0]), (2,)),
+        (lambda: Cylinder([0.5, 0.4], 1.0), (2,)),
+        (lambda: Cylinder([[0.5], [0.4]], [1.0, 2.0, 3.0]), (2, 3)),
+        (lambda: HalfPlane([[1, 2], [3, 4]], 0.1), (2,)),
+        (lambda: HalfPlane(rotation=[0.1, 0.2, 0.3]), (3,)),
+        (lambda: HalfPlane([1, 2], [0.1]), ()),
+        (lambda: Circle([0.5, 0.6], rotation=[[0.1], [0.2]]), (2,)),
+        (lambda: Circle(0.5, rotation=torch.tensor(0.1)), ()),
+        (lambda: Circle([0.5], rotation=[0.1]), (1,)),
+    ],
+)
+def test_what_is_shared_by_a_batch(make, batch):
+    """All fields get the same batch, and each single one of it is what one would write by hand."""
+    with unchecked():
+        made = make()
+        assert made.numbers.shape == (*batch, sum(made.widths[key] for key in made.written))
+        assert made.translation.shape == (*batch, made.dimensions)
+        again = type(made)(**{key: getattr(made, key) for key in made.written})
+        assert again == made and again.rotation.shape == made.rotation.shape
+        assert made.with_numbers(made.numbers) == made
+        points = torch.rand(4, made.dimensions, dtype=torch.float64)
+        assert made.distance(points).shape == (*batch, 4)
+
+
+@pytest.mark.parametrize("name", language.KINDS)
+def test_the_paper_s_order_has_all_numbers(name, unchecked_shapes):
+    kind = language.KINDS[name]
+    width = kind.dimensions + (4 if kind.dimensions == 3 else 1) + sum(kind.counts.values())
+    made = kind.from_paper(torch.rand(5, width, generator=torch.Generator().manual_seed(0)))
+    assert made.numbers.shape == (5, width)
+    if name in ("cylinder", "cone"):
+        assert kind.from_paper(torch.rand(5, width - 1)).height is None
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        torch.tensor([0, 1]).to_sparse(),
+        torch.zeros(2, device="meta"),
+        np.array([0, None]),
+        [10**400, 0],
+        [0.5, 1],
+        None,
+    ],
+    ids=str,
+)
+def test_what_is_no_matrix(given):
+    with unchecked(), pytest.raises(ProgramError, match=r"complement .*expected \(2\) of 0 and 1"):
+        Stump([Sphere(0.5), Sphere(0.4)], given, [[1], [1]], [1])
+
+
+def test_matrices_of_any_layout_and_byte_order():
+    for given in (np.array([0, 1])[::-1], np.array([1, 0], dtype=">i4")):
+        stump = Stump([Sphere(0.5), Sphere(0.4)], given, [[1], [1]], [1])
+        assert stump.complement.tolist() == [True, False]
+
+
+def test_a_stump_keeps_matrices_of_its_own():
+    given = torch.tensor([True]), np.array([[True]]), torch.tensor([True])
+    stump = Stump([Sphere(0.5)], *given)
+    text = stump.to_text()
+    for matrix in given:
+        matrix[:] = False
+    assert stump.to_text() == text
+
+
+def test_what_is_no_stump():
+    with unchecked():
+        for given in (None, 7):
+            with pytest.raises(ProgramError, match="expected a sequence of them"):
+                Stump(given, [0], [[1]], [1])
+        stump = Stump([Sphere(0.5)], [0], [[1]], [1])
+        for given in ("a", None, [1.0] * 7, torch.ones(8) * 1j):
+            with pytest.raises(ProgramError):
+                stump.with_parameters(given)
+        assert stump.with_parameters(torch.ones(8, dtype=torch.int64)).primitives[0].radius == 1
+
+
+# Programs of the sister languages.
 
 
 def stump_pixels(stump: Stump) -> np.ndarray:

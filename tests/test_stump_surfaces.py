@@ -94,12 +94,20 @@ def test_hand_known_bodies_stay_whole():
     assert turned.volume == pytest.approx(0.16 - math.pi * 0.04 * 0.2)
 
 
-@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
+@pytest.mark.parametrize("scale", [1e-50, 1e-12, 1e-4, 1.0, 1e4, 1e12, 1e50])
 def test_solids_of_any_size(scale):
     shape = nodes([Box((0.5 * scale, 0.4 * scale, 0.1 * scale)), outside(Cylinder(0.2 * scale))])
     for mesh, near in ((shape.mesh(), 1e-9), (shape.marching_cubes(64), 0.03)):
         assert_closed(mesh)
         assert mesh.volume == pytest.approx((0.16 - math.pi * 0.04 * 0.2) * scale**3, rel=near)
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e-70, 1e70, 1e160])
+def test_sizes_out_of_range_are_named(scale):
+    solid, picture = nodes([Sphere(scale)]), nodes([Circle(scale)])
+    for ask in (solid.mesh, solid.marching_cubes, picture.mesh, lambda: picture.area):
+        with pytest.raises(ProgramError, match=r"has sides of 2e.*; expected sizes from 1e-60 to 1e\+60"):
+            ask()
 
 
 def test_primitives_without_a_volume_make_none():
@@ -303,7 +311,7 @@ def test_areas_by_hand():
         assert not area or plate.volume == pytest.approx(0.25 * area, rel=1e-6)
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("scale", [1e-50, 1e-6, 1.0, 1e6, 1e50])
 def test_pictures_of_any_size(scale):
     shape = nodes([Square((0.5 * scale, 0.25 * scale)), outside(Circle(0.1 * scale))])
     assert shape.area == pytest.approx((0.5 - math.pi * 0.01) * scale**2, rel=1e-8)

@@ -259,6 +259,18 @@ def test_bad_trees(given, words):
         Stump.from_tree(given)
 
 
+@pytest.mark.parametrize("operation", "+*-")
+def test_a_tree_that_stands_in_itself(operation, time_limit):
+    inner = Tree(Operation("+"), A, B)
+    outer = Tree(Operation(operation), inner, B)
+    object.__setattr__(inner, "right", outer)
+    with time_limit(5), pytest.raises(ProgramError, match="stands below itself"):
+        Stump.from_tree(outer)
+    object.__setattr__(inner, "right", inner)
+    with time_limit(5), pytest.raises(ProgramError, match="stands below itself"):
+        Stump.from_tree(Tree(Operation(operation), A, inner))
+
+
 def test_what_is_no_tree_at_all():
     """Not checked by annotations: a user has none."""
     with unchecked():

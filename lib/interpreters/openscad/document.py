@@ -13,7 +13,10 @@ Comments are printed and, when read, left out; `at` is where something stood in 
 a say in equality, nor has the layout: `f() g();` and `f() { g(); }` are equal.
 """
 
+import math
 from dataclasses import dataclass, field
+
+from .errors import ScadError
 
 Place = tuple[int, int] | tuple[None, None]  # line and column, from 1
 NOWHERE = (None, None)
@@ -126,7 +129,9 @@ class Document:
 
 
 def number(value: float) -> Expression:
-    """A number of any sign, -0.0 included."""
+    """A number of any sign, -0.0 included. Raises ScadError for one that is not finite."""
+    if not math.isfinite(value):
+        raise ScadError(f"found the number {value}", expected="one that is finite, and not near the largest")
     return Negative(Number(-value)) if str(value).startswith("-") else Number(value)
 
 

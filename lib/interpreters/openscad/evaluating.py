@@ -28,8 +28,8 @@ from .document import (
     Vector,
 )
 from .errors import ScadError
-from .helpers import helpers
-from .words import RESERVED
+from .helpers import helpers, used
+from .words import OUR_FUNCTIONS, RESERVED
 
 Value = float | str | tuple
 _MATRIX = "three vectors of 3 numbers"
@@ -38,11 +38,13 @@ _OPERATIONS = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": ope
 
 @dataclass(frozen=True)
 class Contents:
-    """parameters: their values; written: what stands for them; modules: but for the helpers; calls: what is drawn."""
+    """parameters: their values; written: what stands for them, names looked up; modules and functions: but for the
+    helpers; calls: what is drawn."""
 
     parameters: dict[str, Value]
     written: dict[str, Expression]
     modules: dict[str, Module]
+    functions: dict[str, Function]
     calls: tuple[Call, ...]
 
     def value(self, expression: Expression) -> Value:
@@ -50,10 +52,7 @@ class Contents:
 
     def place(self, expression: Expression) -> Place:
         """Where a reader would change it: the parameter's own place, if it is one."""
-        seen = expression
-        while isinstance(seen, Name) and seen.name in self.written:
-            seen = self.written[seen.name]
-        return seen.at
+        return _looked_up(expression, self.written).at
 
     def number(self, expression: Expression) -> float:
         value = self.value(expression)
@@ -125,6 +124,7 @@ def contents(document: Document) -> Contents:
     parameters: dict[str, Value] = {}
     written: dict[str, Expression] = {}
     modules: dict[str, Module] = {}
+    functions: dict[str, Function] = {}
     first: dict[tuple, Statement] = {}
     for statement in document.statements:
         if isinstance(statement, Call):
@@ -137,15 +137,20 @@ def contents(document: Document) -> Contents:
             raise ScadError(found, *statement.at, statement.name, "each name once")
         if isinstance(statement, Assign):
             parameters[statement.name] = evaluate(statement.value, parameters)
-            written[statement.name] = statement.value
+            written[statement.name] = _looked_up(statement.value, written)
         elif statement.name in helpers():
             _check_helper(statement)
+        elif isinstance(statement, Function) and statement.name in OUR_FUNCTIONS:
+            functions[statement.name] = statement
         else:
             modules[statement.name] = _own(statement)
-    _check_calls(document, first)
-    return Contents(
-        parameters, written, modules, tuple(s for s in document.statements if isinstance(s, Call))
-    )
+    _check_calls(document, {name for _, name in first})
+    calls = tuple(s for s in document.statements if isinstance(s, Call))
+    return Contents(parameters, written, modules, functions, calls)
+
+
+def _looked_up(expression: Expression, written: dict[str, Expression]) -> Expression:
+    return written.get(expression.name, expression) if isinstance(expression, Name) else expression
 
 
 def _check_helper(statement: Module | Function) -> None:
@@ -161,13 +166,14 @@ def _own(statement: Module | Function) -> Module:
     return statement
 
 
-def _check_calls(document: Document, defined: dict) -> None:
-    """Raises ScadError where a helper is called that the file does not define."""
+def _check_calls(document: Document, defined: set[str]) -> None:
+    """Raises ScadError where a helper is called that the file does not define, or one that this one needs."""
+    missing = {name: sorted((used([helper]) | {name}) - defined) for name, helper in helpers().items()}
     waiting = [s for s in document.statements if isinstance(s, Call | Module)]
     while waiting:
         node = waiting.pop()
-        if isinstance(node, Call) and node.name in helpers() and (Module, node.name) not in defined:
-            found = f"{quoted(node.name)} has no definition"
+        if isinstance(node, Call) and (lacking := missing.get(node.name)):
+            found = f"{quoted(lacking[0])} has no definition"
             raise ScadError(found, *node.at, node.name, "the helper at the end of the file, as we write it")
         waiting += node.children
 

@@ -4,7 +4,7 @@ A file holds those that it uses, and the reader accepts no others. A curved shap
 until its cross-section has the area of the true circle, and a sphere, to one part in a thousand, the true volume.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from functools import cache
 
 from .document import Application, Call, Document, Function, Module, Vector
@@ -18,6 +18,7 @@ _FUNCTIONS = {
         [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
         [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]];""",
     "unit": "function unit(q) = q / norm(q);",
+    "sized": "function sized(q) = q / max(abs(q[0]), abs(q[1]), abs(q[2]), abs(q[3]));",
     "rotation_of": "function rotation_of(q) = turned(q[0], q[1], q[2], q[3]);",
     "affine": """function affine(m, t) = [
         [m[0][0], m[0][1], m[0][2], t[0]],
@@ -34,22 +35,23 @@ _FUNCTIONS = {
 }
 _STUMPS = {
     "placed": """module placed(translation, rotation)
-        multmatrix(affine(rotation_of(unit(rotation)), translation)) children();""",
+        multmatrix(affine(rotation_of(unit(sized(rotation))), translation)) children();""",
     "placed_2d": """module placed_2d(translation, rotation)
         translate(translation) rotate(rotation * 180 / PI) children();""",
     "box_of": "module box_of(half) cube([2 * abs(half[0]), 2 * abs(half[1]), 2 * abs(half[2])], center = true);",
     "sphere_of": "module sphere_of(radius) sphere(r = abs(radius) * pow(swollen(), 5 / 3));",
     "cylinder_of": """module cylinder_of(radius, height)
         cylinder(r = abs(radius) * swollen(), h = abs(height), center = true);""",
-    "endless_cylinder_of": "module endless_cylinder_of(radius) cylinder_of(radius, 2 * endless);",
+    "endless_cylinder_of": "module endless_cylinder_of(radius) cylinder_of(radius, 2 * endless());",
     "cone_of": """module cone_of(slope, height)
         cylinder(r1 = 0, r2 = abs(slope * height) * swollen(), h = abs(height));""",
-    "endless_cone_of": "module endless_cone_of(slope) cone_of(slope, endless);",
+    "endless_cone_of": "module endless_cone_of(slope) cone_of(slope, endless());",
     "square_of": "module square_of(half) square([2 * abs(half[0]), 2 * abs(half[1])], center = true);",
     "circle_of": "module circle_of(radius) circle(r = abs(radius) * swollen());",
     "triangle_of": """module triangle_of(left, right, height)
         polygon([[-abs(left), 0], [abs(right), 0], [0, abs(height)]]);""",
-    "half_plane_of": "module half_plane_of() translate([-endless, -endless]) square([2 * endless, endless]);",
+    "half_plane_of": """module half_plane_of()
+        translate([-endless(), -endless()]) square([2 * endless(), endless()]);""",
     "extruded": "module extruded() linear_extrude(height = height) children();",
     "window": "module window() translate(window_low) cube(window_high - window_low);",
     "window_2d": "module window_2d() translate(window_low) square(window_high - window_low);",
@@ -107,7 +109,7 @@ def _content(helper: Module | Function):
     return helper.children if isinstance(helper, Module) else helper.value
 
 
-def used(statements: Sequence) -> set[str]:
+def used(statements: Iterable) -> set[str]:
     """Names of the helpers that statements use, and of those that these use …"""
     names: set[str] = set()
     waiting = list(statements)

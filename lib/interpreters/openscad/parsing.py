@@ -79,7 +79,7 @@ class _Parser:
             return self.module()
         if self.next.text == "function":
             return self.function()
-        if self.tokens[self.place + 1 :] and self.tokens[self.place + 1].text == "=":
+        if self.next.kind == "name" and self.tokens[self.place + 1].text == "=":
             return self.assign()
         return self.call("a parameter 'name = …;', a module, or a call 'name();'")
 

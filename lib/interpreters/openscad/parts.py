@@ -10,6 +10,7 @@ put them there; so it is read as `Parts`.
 """
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 
 import torch
@@ -45,6 +46,9 @@ class Parts:
     cuboids: Cuboids
 
     def __post_init__(self):
+        if not isinstance(self.names, tuple | list) or not isinstance(self.cuboids, Cuboids):
+            found = f"found a {type(self.names).__name__} and a {type(self.cuboids).__name__}"
+            raise ScadError(found, expected="a tuple of names, and Cuboids")
         object.__setattr__(self, "names", tuple(self.names))
         object.__setattr__(self, "cuboids", self.cuboids.detach().to(torch.device("cpu"), torch.float64))
         if self.cuboids.size.shape != (len(self.names), 3):
@@ -57,7 +61,7 @@ class Parts:
             if not fine:
                 raise ScadError(f"{quoted(name)} has a number that is not finite", expected="finite ones")
         if len(set(self.names)) < len(self.names):
-            twice = next(name for name in self.names if self.names.count(name) > 1)
+            twice = Counter(self.names).most_common(1)[0][0]
             raise ScadError(f"two boxes are named {quoted(twice)}", expected="different names")
 
     def __eq__(self, other) -> bool:

@@ -54,11 +54,10 @@ def _lines(statement: Statement) -> list[str]:
     if isinstance(statement, Function):
         head = f"function {statement.name}({', '.join(statement.parameters)}) ="
         value = _broken(statement.value)
-        return (
-            [f"{head} {value[0]};"]
-            if len(value) == 1
-            else [f"{head} {value[0]}", *value[1:-1], f"{value[-1]};"]
-        )
+        if len(value) > 1:
+            return [f"{head} {value[0]}", *value[1:-1], f"{value[-1]};"]
+        wrapped = {"subsequent_indent": _STEP, "break_long_words": False, "break_on_hyphens": False}
+        return textwrap.wrap(f"{head} {value[0]};", WIDTH, **wrapped)
     if isinstance(statement, Call):
         return _calls([statement], "")
     head = f"module {statement.name}({', '.join(statement.parameters)})"

@@ -15,10 +15,10 @@ from ..quoting import quoted
 from .document import Assign, Call, Document, Module, Number, Text, call, vector
 from .errors import ScadError
 from .evaluating import Contents, only_child, without_children
+from .frame import SEGMENTS
 from .helpers import used
 
 LANGUAGE = "CSG"
-SEGMENTS = 48
 OPERATIONS = {"+": "union", "*": "intersection", "-": "difference"}
 _SYMBOLS = {name: symbol for symbol, name in OPERATIONS.items()}
 _SIZES = {"r": "radius", "s": "side", "h": "height"}  # of a primitive's fields; the others are its center

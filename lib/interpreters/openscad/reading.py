@@ -3,8 +3,10 @@
 from ..csg.program import Program
 from ..stump.program import Stump
 from . import parts, programs, stumps
+from .document import Name
 from .errors import ScadError
 from .evaluating import contents, describe
+from .frame import check_frame
 from .parsing import parse
 from .stump_reading import read_stump
 
@@ -24,8 +26,9 @@ def read(text: str) -> Stump | Program | parts.Parts:
     """
     file = contents(parse(text))
     language = file.parameters.get("language")
-    if language not in _READERS:
+    if not isinstance(language, str) or language not in _READERS:  # what is nested deep is slow to hash
         found = "no parameter 'language'" if language is None else f"language is {describe(language)}"
-        place = file.written["language"].at if language is not None else (None, None)
+        place = file.place(Name("language"))
         raise ScadError(found, *place, expected=" or ".join(f'language = "{name}";' for name in _READERS))
+    check_frame(file)
     return _READERS[language](file)

@@ -9,6 +9,7 @@ from ..stump.poses import ANGLES
 from ..stump.primitives import POSE, Primitive
 from ..stump.program import MOST, Stump
 from .document import Call, Module
+from .endless import check_endless
 from .errors import ScadError
 from .evaluating import Contents, only_child, without_children
 from .stumps import FORMS
@@ -22,6 +23,7 @@ def read_stump(file: Contents) -> Stump:
     """Raises ScadError for a file that says no stump."""
     numbered = _numbered(file)
     primitives = _read_primitives(file, _in_order("F", numbered["F"]))
+    check_endless(file, primitives)
     nodes = [_Node(file, len(primitives), only_child(module)) for module in _in_order("S", numbered["S"])]
     unused = [_Node(file, len(primitives), only_child(module)) for module in numbered["unused"].values()]
     complement = _complement(len(primitives), [*nodes, *unused])

@@ -7,13 +7,9 @@
     module unused() difference() { window(); F5(); }             complemented, but in no node
     module T() union() { S1(); S2(); }
 
-What goes on for ever ends at `endless` from its translation, and T at the window, as its meshes do. Both are for the
+What goes on for ever ends at `endless()` from its translation, and T at the window, as its meshes do. Both are for the
 eye: a stump has neither.
 """
-
-import math
-
-import torch
 
 from ..stump.bounds import bounds, window
 from ..stump.primitives import (
@@ -30,10 +26,11 @@ from ..stump.primitives import (
 )
 from ..stump.program import Stump
 from .document import Assign, Call, Document, Module, Number, Text, call, vector
+from .endless import WINDOW, endless_function
+from .frame import SEGMENTS
 from .helpers import used
 
 LANGUAGE = "CSG-Stump"
-SEGMENTS = 48  # corners of a circle: OpenSCAD's solids take seconds with many more
 FORMS = {  # helper -> kind, sizes
     "box_of": (Box, ("half",)),
     "sphere_of": (Sphere, ("radius",)),
@@ -49,7 +46,7 @@ FORMS = {  # helper -> kind, sizes
 _NAMES = {form: name for name, form in FORMS.items()}
 _HEADER = """{0!r} of {1}, for OpenSCAD. Lengths are the stump's own; slicers take them for millimetres.
 Change the parameters as you like. F are primitives, S intersections of them, T, the shape, is a union of S.
-A node without F2, say, says "difference": F2 is cut out of it.
+A node that lies outside of F2, say, is written as a difference: F2 is cut out of it.
 {2}"""
 
 
@@ -60,11 +57,11 @@ def write_stump(stump: Stump) -> Document:
         *_nodes(stump),
         _shape(stump),
     ]
-    parameters = [*_frame(stump, used(modules)), *_numbers(stump)]
+    helpers = used(modules)
+    parameters = [*_frame(stump, helpers), *_numbers(stump)]
+    drawn = (_drawing(stump), *endless_function(stump.primitives, helpers))
     world = "space" if stump.dimensions == 3 else "the plane"
-    return Document(
-        (*parameters, *modules, _drawing(stump)), _HEADER.format(stump, world, _TURN[stump.dimensions])
-    )
+    return Document((*parameters, *modules, *drawn), _HEADER.format(stump, world, _TURN[stump.dimensions]))
 
 
 def _form(primitive: Primitive) -> tuple[type, tuple[str, ...]]:
@@ -81,24 +78,12 @@ def _frame(stump: Stump, helpers: set[str]) -> list[Assign]:
     if stump.dimensions == 2:
         sides = window(stump)[1] - window(stump)[0]
         made.append(Assign("height", Number(float(sides.max()) / 8 or 1.0), note="of the plate"))
-    if helpers & {"endless_cylinder_of", "endless_cone_of", "half_plane_of"}:
-        made.append(Assign("endless", Number(_endless(stump)), note="how far what goes on for ever is drawn"))
     if helpers & {"window", "window_2d"}:
-        low, high = window(stump).tolist()
-        made.append(
-            Assign("window_low", vector(low), note="what goes on for ever is cut here; widen it at will")
-        )
-        made.append(Assign("window_high", vector(high)))
+        note = "the shape goes on for ever: this much of it is drawn; widen it at will"
+        for name, corner in zip(WINDOW, window(stump).tolist()):
+            made.append(Assign(name, vector(corner), note=note))
+            note = ""
     return made
-
-
-def _endless(stump: Stump) -> float:
-    """Twice as far as the window's farthest corner is from any primitive, in whole units."""
-    low, high = window(stump).cpu()
-    middle, radius = (low + high) / 2, (high - low).norm() / 2
-    places = torch.stack([p.translation.detach().double().cpu() for p in stump.primitives])
-    farthest = float(((places - middle).norm(dim=1) + radius).max())
-    return max(1, math.ceil(2 * farthest)) if farthest < 1e15 else min(2 * farthest, 1e300)
 
 
 _MEANING = {

@@ -17,6 +17,7 @@ _TOKEN = re.compile(
     | (?P<symbol>[<>=!]=|&&|\|\||/(?!\*)|[-+*%^()\[\]{}=,;:.?<>!\#])""",
     re.VERBOSE | re.DOTALL | re.ASCII,
 )
+_LONE_RETURN = re.compile(r"\r(?!\n|$)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +33,16 @@ def tokens(text: str) -> list[Token]:
         raise ScadError(f"found a {type(text).__name__}", expected="an OpenSCAD file as text")
     if len(text) > LONGEST:
         raise ScadError(f"the text has {len(text)} characters", expected=f"at most {LONGEST}")
+    text = text.removeprefix("\ufeff")
     found, place, line, start = [], 0, 1, 0
     while place < len(text):
         match, at = _TOKEN.match(text, place), (line, place - start + 1)
         if match is None:
             raise _no_token(text, place, at)
+        if match.lastgroup == "blank" and _LONE_RETURN.search(match[0]):
+            raise ScadError(
+                "a line ends with a carriage return alone", *at, expected="line feeds, as OpenSCAD"
+            )
         if match.lastgroup != "blank":
             found.append(Token(match.lastgroup, match[0], at))
         elif "\n" in match[0]:

@@ -24,4 +24,5 @@ OTHER_MODULES = KEYWORDS | {
 }  # fmt: skip
 CONSTANTS = {"true", "false", "undef", "PI"}
 OTHER_SYMBOLS = set("%^:.?<>!#") | {"<=", ">=", "==", "!=", "&&", "||"}
+OUR_FUNCTIONS = {"endless"}  # but for the helpers, which are the same in all files
 RESERVED = KEYWORDS | OUR_MODULES | OTHER_MODULES | CONSTANTS

@@ -5,7 +5,7 @@ import re
 
 from .lines import Piece
 from .poses import ANGLES
-from .primitives import KINDS, POSE, Primitive
+from .primitives import KINDS, Primitive, is_optional
 
 _NOT = re.compile(r"not\b")
 _NAME = re.compile(r"[A-Za-z_]\w*")
@@ -26,7 +26,7 @@ def read_primitive(piece: Piece) -> tuple[bool, Primitive]:
         key, values = _argument(argument, kind, given)
         given[key] = values
     for key in kind.counts:
-        if key not in given and not _is_optional(kind, key):
+        if key not in given and not is_optional(kind, key):
             raise call.error(f"has no {key}", form(kind))
     return outside is not None, kind(**{key: v if len(v) > 1 else v[0] for key, v in given.items()})
 
@@ -41,7 +41,7 @@ def form(kind: type[Primitive]) -> str:
     words = []
     for key, width in _widths(kind).items():
         word = f"{key}={_dots(width)}"
-        words.append(f"[{word}]" if _is_optional(kind, key) else word)
+        words.append(f"[{word}]" if is_optional(kind, key) else word)
     return f"{kind.name}({', '.join(words)})"
 
 
@@ -95,10 +95,6 @@ def _number(word: Piece, key: str) -> float:
     if not math.isfinite(value):
         raise word.error(f"in {key} is no finite number", "a number such as 0.25 or -1e-3")
     return value
-
-
-def _is_optional(kind: type[Primitive], key: str) -> bool:
-    return key in POSE or (key == "height" and kind.dimensions == 3)
 
 
 def _widths(kind: type[Primitive]) -> dict[str, int]:

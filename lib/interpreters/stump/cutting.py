@@ -14,8 +14,14 @@ from jaxtyping import Float
 from torch import Tensor
 
 from .bounds import bounds
+from .errors import ProgramError
 from .primitives import Primitive
 from .program import Stump
+
+SIZES = (
+    1e-60,
+    1e60,
+)  # of windows: the fifth powers, which moments of inertia are, still lie in float64's range
 
 Piece = TypeVar("Piece")  # manifold3d's Manifold or CrossSection
 
@@ -29,6 +35,15 @@ def sight(stump: Stump, window: Float[Tensor, "2 d"]) -> Float[Tensor, "2 d"]:
     size = (high - low).max()
     ends = shape_low >= low - 1e-9 * size, shape_high <= high + 1e-9 * size
     return torch.stack([torch.where(ends[0], low - size, low), torch.where(ends[1], high + size, high)])
+
+
+def side(window: Float[Tensor, "2 d"]) -> float:
+    """The window's longest side, perhaps 0. Raises ProgramError for one that is too small or large to compute with."""
+    longest = float((window[1] - window[0]).max())
+    if longest and not SIZES[0] <= longest <= SIZES[1]:
+        expected = f"sizes from {SIZES[0]:g} to {SIZES[1]:g}"
+        raise ProgramError(f"the shape's window has sides of {longest:g}", expected=expected)
+    return longest
 
 
 def reach(primitive: Primitive, box: Float[Tensor, "2 d"]) -> float:

@@ -3,6 +3,7 @@
 import operator
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
@@ -110,8 +111,9 @@ class Shapes(Sequence):
 
         All stumps are computed as one batch, or as a few where their matrices are large.
         """
-        if not self.programs:
-            return torch.zeros(0, len(points), dtype=torch.bool)
+        if not self.programs:  # of either dimension
+            flat = isinstance(points, Tensor | np.ndarray) and points.shape[1:] == (2,)
+            return torch.zeros(0, len(check_points(points, "xy" if flat else "xyz")), dtype=torch.bool)
         points = check_points(points, "xyz"[: self.programs[0].dimensions])
         points = points.to(_device(self.programs[0]))
         return torch.cat([_Pack(part).occupancy(points) for part in _parts(self.programs)])

@@ -16,7 +16,7 @@ from .. import rings as shared
 from ..checks import MOST_SEGMENTS, check_segments
 from ..meshes import triangles
 from ..rings import Rings, swollen
-from .cutting import assemble, reach, sight
+from .cutting import assemble, reach, side, sight
 from .poses import matrices
 from .primitives import Circle, Primitive, Square, Triangle
 from .program import Stump
@@ -59,7 +59,7 @@ def to_svg(outline: Rings, window: Window, color: str) -> str:
 def _canvas(window: Window) -> tuple[Float[np.ndarray, "2"], float]:
     """The point at the canvas's middle, and how long a canvas unit is."""
     low, high = window.numpy()
-    return (low + high) / 2, float((high - low).max()) / SIDE or 1.0
+    return (low + high) / 2, side(window) / SIDE or 1.0
 
 
 def _rings(stump: Stump, window: Window, segments: int) -> Rings:

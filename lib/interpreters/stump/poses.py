@@ -2,9 +2,9 @@
 
     p = R(rotation) (x - translation)
 
-In space a rotation is a quaternion (w, x, y, z) of any length but zero, which turns world axes into the primitive's
-own (p = q (x - t) q*, the convention of the paper's program). In the plane it is one angle in radians: the primitive
-itself stands turned by it, counter-clockwise where y points up.
+In space a rotation is a quaternion (w, x, y, z) of any length but nearly none (1e-150), which turns world axes into
+the primitive's own (p = q (x - t) q*, the convention of the paper's program). In the plane it is one angle in radians:
+the primitive itself stands turned by it, counter-clockwise where y points up.
 """
 
 import torch
@@ -24,7 +24,10 @@ def matrices(rotation: Float[Tensor, "*n angles"]) -> Float[Tensor, "*n d d"]:
     if rotation.shape[-1] == 1:
         cos, sin = rotation[..., 0].cos(), rotation[..., 0].sin()
         return torch.stack([cos, sin, -sin, cos], -1).unflatten(-1, (2, 2))
-    w, x, y, z = torch.nn.functional.normalize(rotation, dim=-1).unbind(-1)
+    tiny = torch.finfo(
+        rotation.dtype
+    ).tiny  # the default would leave quaternions shorter than 1e-12 as they are
+    w, x, y, z = torch.nn.functional.normalize(rotation, dim=-1, eps=tiny).unbind(-1)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),

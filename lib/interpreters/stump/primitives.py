@@ -9,7 +9,7 @@ on for ever, as the paper's do. Sizes count without their sign (`distances` has 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
@@ -18,40 +18,42 @@ from torch import Tensor
 
 from . import distances as formulas
 from .errors import ProgramError
+from .given import Numbers, as_field, as_numbers, model, shared_batch
 from .poses import ANGLES, matrices, unturned
 
-Numbers = Tensor | Sequence[float] | float | None
 POSE = ("translation", "rotation")
 
 
 @dataclass(frozen=True, eq=False)
 class Primitive:
-    """What all kinds share. Every field is a tensor: (*n) or, for `half` and the pose, (*n, numbers); numbers that are
-    no tensors become float64. Leading dimensions *n make a batch."""
+    """What all kinds share. Every field is a tensor: (*n) or, for `half` and the pose, (*n, numbers).
+
+    Leading dimensions *n make a batch; a field without them is shared by all. All have the type and the device of the
+    first floating tensor given; without one they are float64. Raises ProgramError for other numbers, for batches that
+    do not broadcast, and for a size left out, unless it is a height in space.
+    """
 
     name: ClassVar[str] = ""  # as written in a program
     dimensions: ClassVar[int] = 3
     counts: ClassVar[dict[str, int]] = {}  # numbers of each size; 1: a scalar
 
     def __post_init__(self):
-        given = {key: _tensor(getattr(self, key)) for key in self._given()}
-        like = next(iter(given.values()), torch.zeros((), dtype=torch.float64))
-        batch = like.shape[:-1] if self.widths.get(next(iter(given), ""), 1) > 1 else like.shape
-        defaults = {"translation": [0.0] * self.dimensions, "rotation": unturned(self.dimensions)}
-        for key, numbers in defaults.items():
-            given.setdefault(key, like.new_tensor(numbers).expand(*batch, len(numbers)))
+        given, batches = {}, {}
+        for key, width in self.widths.items():
+            if (value := getattr(self, key)) is not None:
+                what = f"{key} of a {self.name}"
+                given[key], batches[key] = as_field(what, value, width, key == "rotation", batches)
+            elif not is_optional(type(self), key):
+                raise ProgramError(f"a {self.name} has no {key}", expected="numbers")
+        batch = shared_batch(self.name, batches)
+        like = model([getattr(self, key) for key in given])
+        for key, numbers in zip(POSE, ([0.0] * self.dimensions, unturned(self.dimensions))):
+            if key not in given:
+                given[key], batches[key] = like.new_tensor(numbers), ()
         for key, value in given.items():
-            width = self.widths[key]
-            if width > 1 and value.shape[-1:] != (width,):
-                raise ProgramError(
-                    f"{key} of a {self.name} has the shape {tuple(value.shape)}", expected=f"{width} numbers"
-                )
-            if key == "rotation" and width == 1 and value.shape == batch:
-                value = value.unsqueeze(-1)  # in the plane one may write rotation=0.5
-            object.__setattr__(self, key, value)
-
-    def _given(self) -> list[str]:
-        return [field.name for field in fields(self) if getattr(self, field.name) is not None]
+            if batches[key] != batch:
+                value = value.expand(*batch, *value.shape[len(batches[key]) :])
+            object.__setattr__(self, key, value.to(like))
 
     @property
     def widths(self) -> dict[str, int]:
@@ -84,24 +86,30 @@ class Primitive:
         return value.unsqueeze(-1) if self.widths[key] == 1 and key != "rotation" else value
 
     def with_numbers(self, numbers: Float[Tensor, "*n k"]) -> "Primitive":
-        """The same kind with other numbers, in text order."""
-        widths = [self.widths[key] for key in self.written]
-        parts = dict(zip(self.written, numbers.split(widths, -1)))
-        scalars = {
-            key: parts[key].squeeze(-1) for key in self.counts if key in parts and self.widths[key] == 1
-        }
-        return type(self)(**(parts | scalars))
+        """The same kind with other numbers, in text order. Raises ProgramError for too few or too many."""
+        return self._cut(numbers, {key: self.widths[key] for key in self.written})
 
     @classmethod
     def from_paper(cls, numbers: Float[Tensor, "*n k"]) -> "Primitive":
-        """From the order of the paper's program: rotation, translation, sizes. Sizes that are left out are None."""
-        angles, place = ANGLES[cls.dimensions], ANGLES[cls.dimensions] + cls.dimensions
-        given, start = {"rotation": numbers[..., :angles], "translation": numbers[..., angles:place]}, place
-        for key, width in cls.counts.items():
-            if start + width <= numbers.shape[-1]:
-                given[key] = numbers[..., start] if width == 1 else numbers[..., start : start + width]
-            start += width
-        return cls(**given)
+        """From the order of the paper's program: rotation, translation, sizes; without a height, that is None.
+
+        Raises ProgramError for too few or too many.
+        """
+        widths = {"rotation": ANGLES[cls.dimensions], "translation": cls.dimensions, **cls.counts}
+        numbers = as_numbers(numbers)
+        if is_optional(cls, "height") and numbers.shape[-1:] == (sum(widths.values()) - 1,):
+            widths.pop("height", None)
+        return cls._cut(numbers, widths)
+
+    @classmethod
+    def _cut(cls, numbers: Float[Tensor, "*n k"], widths: dict[str, int]) -> "Primitive":
+        """From fields of these widths side by side."""
+        numbers, count = as_numbers(numbers), sum(widths.values())
+        if numbers.shape[-1:] != (count,):
+            found = f"numbers of shape {tuple(numbers.shape)} for a {cls.name}"
+            raise ProgramError(found, expected=f"{count}: {', '.join(widths)}")
+        parts = dict(zip(widths, numbers.split(list(widths.values()), -1)))
+        return cls(**{key: p.squeeze(-1) if cls.counts.get(key) == 1 else p for key, p in parts.items()})
 
     def to(self, *args) -> "Primitive":
         """The same with another dtype or on another device, as `Tensor.to`."""
@@ -253,14 +261,9 @@ class HalfPlane(Primitive):
 KINDS = {kind.name: kind for kind in (Box, Sphere, Cylinder, Cone, Square, Circle, Triangle, HalfPlane)}
 
 
-def _tensor(numbers: Numbers) -> Tensor:
-    """A tensor stays what it is; everything else becomes float64. Raises ProgramError for what are no numbers."""
-    if isinstance(numbers, Tensor):
-        return numbers
-    try:
-        return torch.as_tensor(numbers, dtype=torch.float64)
-    except (TypeError, ValueError, RuntimeError):
-        raise ProgramError(f"found {numbers!r:.40}", expected="numbers") from None
+def is_optional(kind: type[Primitive], key: str) -> bool:
+    """May this field be left out?"""
+    return key in POSE or (key == "height" and kind.dimensions == 3)
 
 
 def stack(primitives: Sequence[Primitive]) -> Primitive:

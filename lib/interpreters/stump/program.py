@@ -8,7 +8,7 @@ O_k(x) is 1 inside primitive k, its surface included, else 0. Two edges follow f
 nothing is the whole space, and a union of nothing is empty. (CSG-Stump Net, Ren et al. 2021, "CSG-Stump Structure".)
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from .errors import ProgramError
+from .given import as_numbers, native
 from .primitives import Primitive, distances
 
 EVERYTHING, NOTHING = "everything", "nothing"  # an intersection, and a union, of nothing
@@ -37,6 +38,9 @@ class Stump:
     union: Matrix  # (C)
 
     def __post_init__(self):
+        if not isinstance(self.primitives, Iterable):
+            found = f"the primitives are a {type(self.primitives).__name__}"
+            raise ProgramError(found, expected="a sequence of them, such as [Sphere(0.5)]")
         object.__setattr__(self, "primitives", tuple(self.primitives))
         check_primitives(self.primitives)
         count = len(self.primitives)
@@ -47,8 +51,10 @@ class Stump:
             raise ProgramError(found, expected="as many")
 
     def __repr__(self) -> str:
-        used, nodes = self.intersection.shape
-        return f"Stump({used} primitives, {nodes} nodes, {int(self.union.sum())} united)"
+        used, nodes = (
+            f"{n} {word}{'s' * (n != 1)}" for n, word in zip(self.intersection.shape, ("primitive", "node"))
+        )
+        return f"Stump({used}, {nodes}, {int(self.union.sum())} united)"
 
     def __eq__(self, other) -> bool:
         return (
@@ -88,7 +94,7 @@ class Stump:
 
     def with_parameters(self, vector: Float[Tensor, " p"]) -> "Stump":
         """The same matrices with other numbers; gradients flow from its distances into the vector."""
-        vector = vector if isinstance(vector, Tensor) else torch.as_tensor(vector, dtype=torch.float64)
+        vector = as_numbers(vector)
         widths = [len(primitive.numbers) for primitive in self.primitives]
         if vector.shape != (sum(widths),):
             raise ProgramError(
@@ -175,17 +181,19 @@ def check_primitives(primitives: tuple) -> None:
 
 
 def _binary(key: str, given, shape: tuple) -> Bool[Tensor, "*n"]:
-    """The matrix as bools. Raises ProgramError for another shape, and for anything but 0 and 1."""
+    """The matrix as bools of its own. Raises ProgramError for another shape, and for anything but 0 and 1."""
     expected = "(" + ", ".join(str(n or "C") for n in shape) + ") of 0 and 1"
     try:
-        matrix = torch.as_tensor(given)
+        matrix = torch.as_tensor(native(given))
     except (TypeError, ValueError, RuntimeError):
         raise ProgramError(f"{key} is {given!r:.40}", expected=expected) from None
     fits = matrix.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, matrix.shape))
     if not fits:
         raise ProgramError(f"{key} has the shape {tuple(matrix.shape)}", expected=expected)
+    if matrix.layout != torch.strided or matrix.is_meta:
+        raise ProgramError(f"{key} is a sparse or a meta tensor", expected=expected)
     if matrix.numel() > MOST:
         raise ProgramError(f"{key} has {matrix.numel()} cells", expected=f"at most {MOST}")
     if not ((matrix == 0) | (matrix == 1)).all():
         raise ProgramError(f"{key} has other numbers than 0 and 1", expected=expected)
-    return matrix.bool()
+    return matrix.to(torch.bool, copy=True)

@@ -84,7 +84,11 @@ class Shape:
         return [matrix.to(self.device) for matrix in self.program.matrices]
 
     def soft_occupancy(self, points, sharpness: float = 150.0) -> Float[Tensor, " m"]:
-        """T of O = sigmoid(-sharpness * distance), from 0 outside to 1 inside; differentiable."""
+        """T of O = sigmoid(-sharpness * distance), from 0 outside to 1 inside; differentiable.
+
+        Raises ValueError for what are no points, and for a sharpness that is no finite number above 0.
+        """
+        _check_sharpness(sharpness)
         distances = self.program.distances(self._points(points))
         matrices = (matrix.to(distances) for matrix in self._matrices)
         return layers.soft(torch.sigmoid(-sharpness * distances), *matrices)[1]
@@ -115,6 +119,15 @@ class Shape:
         from ..meshes import stl
 
         return stl(check_inside(self.mesh(), ProgramError))
+
+
+def _check_sharpness(sharpness) -> None:
+    try:
+        fits = math.isfinite(sharpness) and sharpness > 0
+    except (TypeError, ValueError, RuntimeError, OverflowError):
+        fits = False
+    if not fits:
+        raise ValueError(f"found a sharpness of {sharpness!r:.40}; expected a finite number above 0")
 
 
 class Picture(Shape):

@@ -10,7 +10,7 @@ from torch import Tensor
 from ..checks import check_segments
 from ..meshes import ball, triangles
 from ..rings import swollen
-from .cutting import assemble, reach, sight
+from .cutting import assemble, reach, side, sight
 from .poses import matrices
 from .primitives import Box, Cone, Primitive, Sphere
 from .program import Stump
@@ -20,7 +20,8 @@ DUST = 1e-12  # of the cube around the window: smaller bodies are left over from
 
 def mesh(stump: Stump, window: Float[Tensor, "2 3"], segments: int) -> trimesh.Trimesh:
     """The surface of the shape within the window, closed."""
-    return triangles(solid(stump, window, segments), DUST * float((window[1] - window[0]).max()) ** 3)
+    dust = DUST * side(window) ** 3
+    return triangles(solid(stump, window, segments), dust)
 
 
 def solid(stump: Stump, window: Float[Tensor, "2 3"], segments: int) -> Manifold:

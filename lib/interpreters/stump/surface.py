@@ -20,6 +20,7 @@ from torch import Tensor
 
 from ..threads import one_thread
 from . import distances as formulas
+from .cutting import side
 from .primitives import Batches, Cone, Primitive
 from .program import Stump
 from .shape import step
@@ -31,9 +32,8 @@ _UNLIKE = 1.001  # so much more counts what is outside, to break ties
 
 def marching_cubes(stump: Stump, window: Float[Tensor, "2 3"], resolution: int) -> trimesh.Trimesh:
     """A closed surface through the cells of a cube about the window's middle, as wide as its longest side."""
-    size = float((window[1] - window[0]).max())
-    samples = field(stump, window, resolution)
-    if not size or not (samples < 0).any():
+    size = side(window)
+    if not size or not ((samples := field(stump, window, resolution)) < 0).any():
         return trimesh.Trimesh()
     corners, faces, _, _ = measure.marching_cubes(samples.cpu().numpy(), 0.0)
     # Sample 1 is the center of cell 0, half a cell from the cube's edge.
@@ -48,7 +48,7 @@ def field(stump: Stump, window: Float[Tensor, "2 3"], resolution: int) -> Float[
 
     Near the surface; elsewhere it only has the right sign.
     """
-    cell = max(float((window[1] - window[0]).max()), torch.finfo(torch.float32).tiny) / resolution
+    cell = 1 / resolution
     field = _Field(stump.pruned(), window)
     count = math.ceil((resolution + 2) / _SIDE)  # blocks along an edge
     axis = (torch.arange(count * _SIDE, device=field.device) - resolution / 2 - 0.5) * cell
@@ -72,16 +72,16 @@ def _without_ties(values: Float[Tensor, "n n n"]) -> Float[Tensor, "n n n"]:
 
 
 class _Field:
-    """The signed field of a stump at some points, seen from the window's middle, in single precision."""
+    """The signed field of a stump in single precision, seen from the window's middle, its longest side as the unit."""
 
     def __init__(self, stump: Stump, window: Float[Tensor, "2 3"]):
         self.device = stump.primitives[0].translation.device
-        middle = window.mean(0).to(self.device)
-        self.batches = Batches([_seen_from(middle, primitive) for primitive in stump.primitives])
+        middle, unit = window.mean(0).to(self.device), side(window) or 1.0
+        self.batches = Batches([_seen_from(middle, unit, primitive) for primitive in stump.primitives])
         self.sign = 1 - 2 * stump.complement.to(self.device).float().unsqueeze(1)
         columns = stump.intersection[:, stump.union].T.to(self.device)
         self.nodes = [column.nonzero()[:, 0] for column in columns]
-        self.half = ((window[1] - window[0]) / 2).to(self.device, torch.float32)
+        self.half = ((window[1] - window[0]) / (2 * unit)).to(self.device, torch.float32)
         self.step = step(len(stump.primitives), self.device)
 
     def __call__(self, points: Float[Tensor, "m 3"]) -> Float[Tensor, " m"]:
@@ -100,8 +100,13 @@ class _Mantle(Cone):
         return formulas.mantle
 
 
-def _seen_from(middle: Float[Tensor, "3"], primitive: Primitive) -> Primitive:
-    moved = replace(primitive, translation=primitive.translation.double() - middle).to(torch.float32)
+def _seen_from(middle: Float[Tensor, "3"], unit: float, primitive: Primitive) -> Primitive:
+    """Moved, and all its lengths divided by the unit."""
+    lengths = {
+        key: getattr(primitive, key).double() for key in primitive.written if key not in ("slope", "rotation")
+    }
+    lengths["translation"] = lengths["translation"] - middle
+    moved = replace(primitive, **{key: length / unit for key, length in lengths.items()}).to(torch.float32)
     if isinstance(primitive, Cone) and primitive.height is None:
         return _Mantle(moved.slope, None, moved.translation, moved.rotation)
     return moved

@@ -110,16 +110,21 @@ def _children_first(tree: Node) -> list[tuple[Node, bool, tuple[Key, ...]]]:
     visited once (twice, where it is complemented somewhere).
     """
     steps, seen, waiting = [], set(), [(tree, False, False)]
+    above: set[Key] = set()  # what the node stands below
     while waiting:
         node, negated, is_done = waiting.pop()
-        operands = _operands(node, negated)
+        operands, key = _operands(node, negated), (id(node), negated)
         if is_done or not operands:
-            if is_done or (id(node), negated) not in seen:
+            if is_done or key not in seen:
                 steps.append((node, negated, tuple((id(operand), sign) for operand, sign in operands)))
-        elif (id(node), negated) not in seen:
+            above.discard(key)
+        elif key in above:
+            raise ProgramError("an operation of the tree stands below itself", expected="a tree that ends")
+        elif key not in seen:
+            above.add(key)
             waiting.append((node, negated, True))
             waiting += [(operand, sign, False) for operand, sign in reversed(operands)]
-        seen.add((id(node), negated))
+        seen.add(key)
     return steps
 
 

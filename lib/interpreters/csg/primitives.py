@@ -16,6 +16,7 @@ at r = 41 their floating-point test adds eight pixels on the circle's rim, which
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import torch
 from jaxtyping import Int
@@ -158,7 +159,7 @@ class Primitive:
     """One primitive, such as Primitive("c", (32, 32, 16)). Raises ProgramError for numbers that are off the canvas."""
 
     kind: str
-    numbers: tuple[int, ...]
+    numbers: tuple[Real, ...]  # whole ones; any others raise ProgramError
 
     def __post_init__(self):
         text = str(self)

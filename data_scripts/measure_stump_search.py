@@ -12,22 +12,20 @@ could do without, as far as is proven, the seconds, and how many answers were pr
 one thread. About three minutes on one core; --quick takes seconds and is for a first look.
 """
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import torch
 from tqdm import tqdm
 
-from data_scripts.ending import exit_code
-from data_scripts.journal import code_digest, write_whole
+from data_scripts.journal import code_digest
+from data_scripts.measuring import command
 from lib.datasets import REPOSITORY
 from lib.finding.arrangement import Arrangement
-from lib.finding.matrices import EXACT, arrange, greedy, solve
+from lib.finding.matrices import EXACT, Matrices, arrange, greedy, solve
 from lib.finding.programming import layers
 
 RESULT = REPOSITORY / "results" / "stump_search.json"
@@ -35,7 +33,6 @@ PRIMITIVES = (2, 4, 6, 8, 10, 12, 16, 24, 32, 48, 64)
 MOST_LAYERS = 16  # with more balls the paper's program finds nothing within the limit
 SEEDS, SECONDS, POINTS, NOISE = 3, 10.0, 4096, 0.02
 QUICK = {"primitives": (2, 4), "seeds": 2, "seconds": 2.0}
-INTERRUPTED = "interrupted; nothing was written"
 ATTEMPTS = 200
 
 
@@ -75,13 +72,11 @@ def by_layers(inside: torch.Tensor, target: torch.Tensor, nodes: int, seconds: f
     return _row(objective, answer.bound / arrangement.total, time.perf_counter() - start)
 
 
-def by_solve(inside: torch.Tensor, target: torch.Tensor, nodes: int, seconds: float) -> dict:
-    found = solve(inside, target, nodes=nodes, seconds=seconds)
-    return _row(found.objective, found.bound, found.seconds)
-
-
-def by_greedy(inside: torch.Tensor, target: torch.Tensor, nodes: int, seconds: float) -> dict:
-    found = greedy(inside, target, nodes=nodes)
+def by(
+    search: Callable[..., Matrices], inside: torch.Tensor, target: torch.Tensor, nodes: int, seconds: float
+) -> dict:
+    """What a search of lib.finding comes to."""
+    found = search(inside, target, nodes=nodes, seconds=seconds)
     return _row(found.objective, found.bound, found.seconds)
 
 
@@ -89,7 +84,11 @@ def _row(objective: float, bound: float, seconds: float) -> dict:
     return {"objective": objective, "bound": bound, "seconds": seconds, "proven": objective - bound <= EXACT}
 
 
-SEARCHES: dict[str, Callable] = {"layers": by_layers, "solve": by_solve, "greedy": by_greedy}
+SEARCHES: dict[str, Callable] = {
+    "layers": by_layers,
+    "solve": partial(by, solve),
+    "greedy": partial(by, greedy),
+}
 
 
 def measure(primitives: tuple[int, ...], seeds: int, seconds: float) -> dict:
@@ -143,27 +142,14 @@ def told(found: dict) -> str:
     return "\n".join("".join(f"{cell:>9}" for cell in line) for line in lines)
 
 
-def run(options: argparse.Namespace) -> None:
-    """Measure, print, and write."""
-    torch.set_num_threads(1)
-    choice = QUICK if options.quick else {"primitives": PRIMITIVES, "seeds": SEEDS, "seconds": SECONDS}
-    found = measure(**choice)
-    print(told(found))
-    write_whole(options.out, (json.dumps(found, indent=1) + "\n").encode())
-    print(f"kept in {options.out}")
-
-
 def main(arguments: list[str] | None = None) -> int:
-    """The command; returns the exit code: 0 finished, 1 nothing could be written, 130 interrupted."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--quick", action="store_true", help="few and small ones, to see that it works")
-    parser.add_argument(
-        "--out", type=Path, default=RESULT, help="the JSON (default: results/stump_search.json)"
-    )
-    options = parser.parse_args(arguments)
-    return exit_code(lambda: run(options), INTERRUPTED)
+    """The command; returns the exit code, as `command` says."""
+    return command(__doc__, RESULT, "few and small ones, to see that it works", run, told, arguments)
+
+
+def run(quick: bool) -> dict:
+    """The figures, of few and small stumps or of all."""
+    return measure(**(QUICK if quick else {"primitives": PRIMITIVES, "seeds": SEEDS, "seconds": SECONDS}))
 
 
 if __name__ == "__main__":

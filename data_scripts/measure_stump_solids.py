@@ -6,20 +6,17 @@ draw the cloud and the search's trials, the matrices are searched for twice, by 
 
 IoU is that of the found and the true solid at 100,000 random points of the true one's bounding box; `box_iou` is what
 the bounding box itself would have. Times are those of one thread. About five minutes on one core; --quick takes one
-seed and three solids.
+seed and three solids, which is half a minute.
 """
 
-import argparse
-import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import torch
 from tqdm import tqdm
 
-from data_scripts.ending import exit_code
-from data_scripts.journal import code_digest, write_whole
+from data_scripts.journal import code_digest
+from data_scripts.measuring import command
 from lib.datasets import REPOSITORY
 from lib.datasets.solids import SOLIDS, solid
 from lib.finding import find_stump, greedy, sample_cloud, solve
@@ -30,7 +27,6 @@ CLOUDS = {"clean": {"noise": 0.0, "outliers": 0.0}, "noisy": {"noise": 0.005, "o
 SEARCHES = {"solve": solve, "greedy": greedy}
 POINTS, PROBES, SEEDS, GOOD = 10_000, 100_000, 3, 0.95
 QUICK = {"solids": ("bolt", "mug", "table"), "seeds": 1}
-INTERRUPTED = "interrupted; nothing was written"
 
 
 def iou(found: Shape, true: Shape) -> float:
@@ -100,26 +96,14 @@ def told(found: dict) -> str:
     return "\n".join(lines)
 
 
-def run(options: argparse.Namespace) -> None:
-    """Measure, print, and write."""
-    torch.set_num_threads(1)
-    found = measure(**(QUICK if options.quick else {"solids": SOLIDS, "seeds": SEEDS}))
-    print(told(found))
-    write_whole(options.out, (json.dumps(found, indent=1) + "\n").encode())
-    print(f"kept in {options.out}")
-
-
 def main(arguments: list[str] | None = None) -> int:
-    """The command; returns the exit code: 0 finished, 1 nothing could be written, 130 interrupted."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--quick", action="store_true", help="three solids and one seed")
-    parser.add_argument(
-        "--out", type=Path, default=RESULT, help="the JSON (default: results/stump_solids.json)"
-    )
-    options = parser.parse_args(arguments)
-    return exit_code(lambda: run(options), INTERRUPTED)
+    """The command; returns the exit code, as `command` says."""
+    return command(__doc__, RESULT, "three solids and one seed", run, told, arguments)
+
+
+def run(quick: bool) -> dict:
+    """The figures, of few solids or of all."""
+    return measure(**(QUICK if quick else {"solids": SOLIDS, "seeds": SEEDS}))
 
 
 if __name__ == "__main__":

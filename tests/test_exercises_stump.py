@@ -18,7 +18,7 @@ from lib.exercises.stump import (
 )  # fmt: skip
 from lib.interpreters.csg import parse as parse_csg
 from lib.interpreters.openscad import write
-from lib.interpreters.stump import Circle, Stump, execute, parse
+from lib.interpreters.stump import Circle, Cylinder, Stump, execute, parse
 from lib.interpreters.stump.poses import unturned
 
 PLATE = """F1 = square(half=(0.5, 0.3))
@@ -29,6 +29,15 @@ T = S1
 """
 HOLED = BLIND.replace("cylinder(radius=0.15, height=0.1, translation=(-0.2, 0.0, 0.05))",
                       "not cylinder(radius=0.15, translation=(-0.2, 0, 0))")  # fmt: skip
+
+
+def with_another(text: str, primitive: str) -> str:
+    """A right answer of one node, united with one primitive more."""
+    number = text.count("= ") - 1
+    text = text.replace("S1 =", f"F{number} = {primitive}\nS1 =")
+    return text.replace("T = S1", f"S2 = F{number}\nT = S1 | S2")
+
+
 DISC = parse("F1 = circle(radius=0.3)\nS1 = F1\nT = S1\n")
 GRID = torch.cartesian_prod(*[torch.linspace(-0.5, 0.5, 80, dtype=torch.float64)] * 2)
 
@@ -100,6 +109,10 @@ def test_plate(answer):
         (PLATE.replace("T = S1", "T = nothing"), "are missing"),
         (PLATE.replace("0.15", "0.2"), "are missing, around (-0."),
         (PLATE.replace("S1 = F1 & F2 & F3", "S1 = everything"), "are too many"),
+        (
+            with_another(PLATE, "circle(radius=0.001, translation=(9, 9))"),
+            "far from the plate, around (9.00, 9.00)",
+        ),
         (PLATE.replace("square(half", "square(side"), "line 1"),
         (HOLED, "a stump of space; write one of the plane"),
     ],
@@ -176,6 +189,15 @@ def test_hole(answer):
             HOLED.replace("S1 = F1 & F2", "S1 = F1 & F2\nS2 = F2").replace("T = S1", "T = S1 | S2"),
             "beyond the plate",
         ),
+        (
+            with_another(HOLED, "sphere(radius=0.01, translation=(5, 5, 5))"),
+            "far from the plate, around (",
+        ),
+        (
+            with_another(HOLED, "box(half=(0.2, 0.2, 0.0001), translation=(-0.2, 0, 0.03))"),
+            "a thin skin closes the hole, around (-0.2",
+        ),
+        (HOLED.replace("radius=0.15", "radius=0.15, height=0.1992"), "a thin skin closes the hole"),
         (HOLED.replace("T = S1", "T = nothing"), "100% of the plate itself is gone"),
         (PLATE, "a stump of the plane; write one of space"),
     ],
@@ -205,6 +227,7 @@ def test_sharpness():
     assert "a smaller sharpness will do" in check_sharpness(1.2 * best, DISC, GRID)
     for answer in (0, -5, float("inf")):
         assert "a number above 0" in check_sharpness(answer, DISC, GRID)
+    assert "there are no points" in check_sharpness(best, DISC, GRID[:0])
 
 
 FILE = washer().to_openscad()
@@ -227,6 +250,7 @@ def test_openscad():
         ("F2_radius = 0.12;", "F2_radius = 0.24", "line "),
         ("F2_radius = 0.12;", "", "F2_radius"),
         ("module T() S1();", "module T() S2();", "S2"),
+        ("F2_radius = 0.12;", "F2_radius = 0.24 + 1e-6;", "something else is changed"),
     ],
 )
 def test_a_wrong_edit(old, new, said):
@@ -234,6 +258,12 @@ def test_a_wrong_edit(old, new, said):
     assert old in FILE
     verdict = check_openscad(text)
     assert hints(verdict) and said in verdict
+
+
+def test_an_edit_that_moves_the_hole_a_little_is_no_answer():
+    disc, drill = washer().primitives
+    moved = Stump((disc, Cylinder(2 * drill.radius, None, (1e-4, 0, 0))), *washer().matrices)
+    assert hints(check_openscad(moved.to_openscad()))
 
 
 def test_another_language_is_no_answer():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import torch
 import trimesh
 
 from lib.finding import CloudError, PointCloud, probes, sample_cloud
@@ -31,6 +32,8 @@ def spoilt(table, place, value):
         (POINTS * [1, 1, 0], NORMALS, "all points of the cloud lie in a plane"),
         (POINTS * [1, 0, 0] + 5, NORMALS, "all points of the cloud lie on a line"),
         (POINTS * 0 + 5, NORMALS, "all points of the cloud are one"),
+        (POINTS + 1j, NORMALS, "points are complex"),
+        (np.tile(POINTS[:20], (10, 1)), NORMALS, "the cloud has 20 different points; expected at least 100"),
         (POINTS, None, "the cloud has no normals; expected one outward normal a point: sample_cloud"),
         (POINTS, NORMALS[:150], "200 points and 150 normals"),
         (POINTS, spoilt(NORMALS, 9, 0), "the normal of point 9 is zero"),
@@ -46,6 +49,12 @@ def test_normals_get_length_one_and_lists_will_do(unchecked_shapes):
     cloud = PointCloud(POINTS.tolist(), (5 * NORMALS).tolist())
     assert np.linalg.norm(cloud.normals, axis=1) == pytest.approx(1)
     assert len(cloud[:120]) == 120
+    assert len(PointCloud(torch.tensor(POINTS, requires_grad=True), NORMALS)) == 200
+
+
+def test_points_that_come_again_count_once_in_their_order():
+    cloud = PointCloud(np.repeat(POINTS, 20, axis=0), np.repeat(NORMALS, 20, axis=0))
+    assert np.array_equal(cloud.points, POINTS) and (areas(cloud) > 0).all()
 
 
 def test_a_made_cloud_lies_on_its_mesh_and_comes_again():
@@ -74,6 +83,18 @@ def test_noise_out_of_range_is_refused(noise, outliers):
         sample_cloud(BALL, 100, noise=noise, outliers=outliers)
 
 
+@pytest.mark.parametrize(
+    "bad, found",
+    [
+        ({"n": -1}, "n is -1"), ({"n": 1.5}, "n is 1.5"), ({"n": "a"}, "n is 'a'"), ({"seed": -1}, "seed is -1"),
+        ({"noise": "a"}, "noise a"), ({"outliers": None}, "outliers None"), ({"mesh": None}, "the mesh is a NoneType"),
+    ],
+)  # fmt: skip
+def test_what_no_cloud_is_made_of(bad, found, unchecked_shapes):
+    with pytest.raises(CloudError, match=found):
+        sample_cloud(**{"mesh": BALL} | bad)
+
+
 def test_a_mesh_without_a_face_is_refused():
     with pytest.raises(CloudError, match="a mesh of 0 faces"):
         sample_cloud(trimesh.Trimesh())
@@ -95,6 +116,15 @@ def test_probes_are_labelled_as_the_ball_is():
     sure = np.abs(radius - 0.5) > 0.01
     assert ((radius < 0.5) == tests.inside)[sure].all()
     assert len(radius) > 3800 and radius.max() > 0.8
+
+
+def test_labels_of_a_large_cloud_are_told_from_some_of_its_points(monkeypatch):
+    monkeypatch.setattr("lib.finding.probing.MOST", 1000)
+    cloud, looked = sample_cloud(BALL, 4000), []
+    monkeypatch.setattr("lib.finding.probing.areas", lambda some: looked.append(len(some)) or areas(some))
+    tests = probes(cloud, 2000, seed=0, step=0.05)
+    sure = np.abs(np.linalg.norm(tests.points, axis=1) - 0.5) > 0.02
+    assert ((np.linalg.norm(tests.points, axis=1) < 0.5) == tests.inside)[sure].all() and looked == [1000]
 
 
 def test_normals_that_point_inwards_are_noticed():

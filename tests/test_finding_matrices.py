@@ -251,6 +251,7 @@ GOOD = {"inside": torch.ones(2, 3, dtype=torch.bool), "target": torch.ones(3, dt
         ({"weights": torch.tensor([1.0, -1.0, 1.0])}, "negative", "at least 0"),
         ({"weights": torch.tensor([1.0, torch.nan, 1.0])}, "not finite", "at least 0"),
         ({"weights": torch.zeros(3)}, "all 0", "some more"),
+        ({"weights": torch.full((3,), 1e308, dtype=torch.double)}, "a weight of 1e+308", "at most 1e+12"),
         ({"weights": "many"}, "weights are 'many'", "a vector (N) of numbers"),
         ({"nodes": 0}, "nodes is 0", "1 or more"),
         ({"nodes": 1.5}, "nodes is 1.5", "a whole number"),
@@ -269,3 +270,12 @@ def test_bad_questions(bad, found, expected, unchecked_shapes):
 def test_a_bad_width():
     with pytest.raises(SearchError, match="width is 0"):
         greedy(**GOOD, width=0)
+
+
+def test_limits_may_be_numpy_s_and_greed_heeds_them_too(unchecked_shapes):
+    limits = {"nodes": np.int64(4), "seconds": np.float32(1)}
+    assert solve(**GOOD, **limits).objective == greedy(**GOOD, **limits).objective == 0
+    inside, target = planted(np.random.default_rng(3), 12, 6)
+    assert len(greedy(inside, target, seconds=1e-9).union) == 0 < len(greedy(inside, target).union)
+    with pytest.raises(SearchError, match="seconds is 0"):
+        greedy(**GOOD, seconds=0)

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 import torch
+import trimesh
 
 from lib.datasets import solid
 from lib.finding import (
     CloudError,
     PointCloud,
     Probes,
+    SearchError,
     Surface,
     candidates,
     find_stump,
@@ -170,3 +172,57 @@ def test_normals_that_point_inwards_are_told(unchecked_shapes):
     cloud = cloud_of("bolt", 1500)
     with pytest.raises(CloudError, match="the normals point into the solid"):
         find_stump(PointCloud(cloud.points, -cloud.normals))
+
+
+BALL = trimesh.creation.icosphere(subdivisions=4, radius=0.5)
+
+
+def test_points_repeated_twenty_times_are_found_as_well(unchecked_shapes):
+    cloud = sample_cloud(BALL, 1500)
+    many = PointCloud(np.repeat(cloud.points, 20, axis=0), np.repeat(cloud.normals, 20, axis=0))
+    assert find_stump(many).stump == find_stump(cloud).stump
+
+
+def with_outlier() -> PointCloud:
+    cloud = sample_cloud(BALL, 1500)
+    return PointCloud(np.vstack([cloud.points, [[1e4, 0, 0]]]), np.vstack([cloud.normals, [[1.0, 0, 0]]]))
+
+
+def two_balls() -> PointCloud:
+    cloud = sample_cloud(BALL, 1500)
+    return PointCloud(np.vstack([cloud.points, cloud.points + [1000, 0, 0]]), np.vstack([cloud.normals] * 2))
+
+
+def sheet() -> PointCloud:
+    return sample_cloud(trimesh.creation.box((1, 1, 0.002)), 1500)
+
+
+@pytest.mark.parametrize(
+    "cloud, likely",
+    [
+        (with_outlier, "than the tolerance, 40 here .*; and no stray points: point 1500 is 1e[+]04 away"),
+        (two_balls, r"than the tolerance, 4 here \(0.40% of the diagonal, 1001; see Options\)$"),
+        (sheet, "than the tolerance, 0.00566 here"),
+    ],
+)
+def test_a_cloud_without_an_inside_is_told_the_likely_cause(cloud, likely, unchecked_shapes):
+    with pytest.raises(CloudError, match=f"the cloud has no inside; expected .*{likely}"):
+        find_stump(cloud())
+
+
+@pytest.mark.parametrize(
+    "bad, error, found",
+    [
+        ({"cloud": None}, CloudError, "the cloud is a NoneType"),
+        ({"seed": -1}, CloudError, "seed is -1"),
+        ({"seed": "a"}, CloudError, "seed is 'a'"),
+        ({"options": 3}, CloudError, "options are a int"),
+        ({"nodes": 0}, SearchError, "nodes is 0"),
+        ({"seconds": -1}, SearchError, "seconds is -1"),
+        ({"search": "solve"}, SearchError, "search is 'solve'"),
+    ],
+)
+def test_bad_arguments_are_told_before_anything_is_detected(bad, error, found, unchecked_shapes, monkeypatch):
+    monkeypatch.setattr("lib.finding.finding.detect", None)  # nobody calls it
+    with pytest.raises(error, match=found):
+        find_stump(**{"cloud": sample_cloud(BALL, 200)} | bad)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from lib.datasets import solid
-from lib.finding import PointCloud, Surface, detect, sample_cloud
+from lib.finding import CloudError, PointCloud, Surface, detect, sample_cloud
 from lib.finding.aligning import aligned
 from lib.finding.detecting import Options, snapped, tolerance_of
 from lib.finding.surfaces import measure, through
@@ -122,6 +123,36 @@ def test_options_bound_the_tolerance():
     cloud = sample_cloud(execute(Stump.from_tree(solid("bolt"))).mesh(), 1000)
     assert tolerance_of(cloud, Options(tolerance=0.02)) == pytest.approx(0.02 * cloud.diagonal)
     assert tolerance_of(cloud, Options()) >= 0.004 * cloud.diagonal
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"tolerance": -1}, {"tolerance": np.nan}, {"angle": 91}, {"fewest": 0}, {"fewest": None}, {"trials": 0},
+        {"trials": 1.5}, {"patience": "long"}, {"most": 0},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_options_out_of_range_are_refused(bad, unchecked_shapes):
+    with pytest.raises(CloudError, match=f"{next(iter(bad))} is "):
+        Options(**bad)
+
+
+def test_detection_ends_with_the_most_surfaces_that_are_wanted(unchecked_shapes):
+    ring = sample_cloud(trimesh.creation.torus(1, 0.3), 1500)
+    assert len(detect(ring, 0, Options(most=3, trials=100))) <= 3
+    assert len(detect(ring, 0, Options(trials=100))) > 3
+
+
+@pytest.mark.parametrize("kind", TRUE)
+def test_directions_know_no_unit(kind):
+    points, numbers = RNG.normal(size=(20, 3)), np.array(TRUE[kind])
+    small = numbers.copy()
+    small[slice(0, 3) if kind == "sphere" else slice(3, 6)] *= 1e-14
+    small[-1] *= 1e-14 if kind in ("sphere", "cylinder") else 1
+    distance, direction = measure(kind, numbers[None], points)
+    other, same = measure(kind, small[None], 1e-14 * points)
+    assert same == pytest.approx(direction) and 1e14 * other == pytest.approx(distance)
 
 
 def flat(normal, middle=(0.0, 0.0, 0.0), tilt=0.0, noise=0.0) -> np.ndarray:

@@ -68,3 +68,11 @@ def test_an_interruption_writes_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(SEARCHES, "solve", interrupt)
     assert measure_stump_search.main(["--quick", "--out", str(tmp_path / "result.json")]) == 130
     assert not list(tmp_path.iterdir()) and "nothing was written" in capsys.readouterr().err
+
+
+def test_a_bad_out_is_told_before_anything_is_measured(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(measure_stump_search, "measure", None)  # nobody calls it
+    (tmp_path / "file").touch()
+    for out in ("", tmp_path, tmp_path / "file" / "result.json"):
+        assert measure_stump_search.main(["--quick", "--out", str(out)]) == 1
+        assert capsys.readouterr().err.startswith("DataError: ")

@@ -1,5 +1,6 @@
 """Checkers for 11_csg_stump, and the shapes they are about. Answers are judged by what is inside them."""
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
@@ -57,9 +58,11 @@ def check_plate(answer: object) -> str:
     stump = _stump(answer, 2)
     if isinstance(stump, str):
         return stump
-    points = _random([[-0.6, -0.6], [0.6, 0.6]])
+    window = [[-0.6, -0.6], [0.6, 0.6]]
+    points = _random(window)
     got, wanted = execute(stump).occupancy(points), execute(parse(_PLATE)).occupancy(points)
-    return _compared(got, wanted, points, SLIPS)
+    verdict = _compared(got, wanted, points, SLIPS)
+    return _within(stump, window) if verdict == OK else verdict
 
 
 def check_matrices(answer: object, most: int = 2) -> str:
@@ -95,7 +98,8 @@ def check_hole(answer: object) -> str:
     stump = _stump(answer, 3)
     if isinstance(stump, str):
         return stump
-    points = _random([[-0.6, -0.4, -0.2], [0.6, 0.4, 0.2]])
+    window = [[-0.6, -0.4, -0.2], [0.6, 0.4, 0.2]]
+    points = _random(window)
     inside = execute(stump).occupancy(points)
     block = execute(Stump([Box((0.5, 0.3, 0.1))], [0], [[1]], [1])).occupancy(points)
     (center, radius) = _DRILL
@@ -109,11 +113,27 @@ def check_hole(answer: object) -> str:
         return hint(f"something stands beyond the plate, {_around(points, inside & ~block)}")
     left = inside & drilled
     if not _many(left, drilled):
-        return OK
+        verdict = _within(stump, window)
+        return _open(stump) if verdict == OK else verdict
     if _share(left, drilled) == "100%":
         return hint("the plate has no hole: what does W_C do to the cylinder?")
     low, high = _number(points[left, 2].min()), _number(points[left, 2].max())
     return hint(f"{_share(left, drilled)} of the hole is still filled, z from {low} to {high}")
+
+
+def _open(stump: Stump) -> str:
+    """ "ok" if no skin, however thin, is left in the hole: told along lines through it."""
+    (x, y), radius = _DRILL
+    depths = 0.1 - torch.cat([torch.logspace(-9, -4, 50).double(), torch.arange(1e-4, 0.1, 5e-5).double()])
+    turns = torch.linspace(0, 2 * torch.pi, 9, dtype=torch.float64)
+    across = [
+        torch.stack([x + r * turns.cos(), y + r * turns.sin()], 1) for r in (0, radius / 2, 0.9 * radius)
+    ]
+    across = torch.cat(across)
+    lines = torch.cat([depths, -depths])
+    points = torch.cat([across.repeat_interleave(len(lines), 0), lines.repeat(len(across))[:, None]], 1)
+    closed = execute(stump).occupancy(points)
+    return hint(f"a thin skin closes the hole, {_around(points, closed)}") if closed.any() else OK
 
 
 def check_sharpness(answer: object, stump: Stump, points: Float[Tensor, "m d"]) -> str:
@@ -126,8 +146,10 @@ def check_sharpness(answer: object, stump: Stump, points: Float[Tensor, "m d"]) 
         return hint(f"the answer is a number, this is of type {type(answer).__name__}")
     if not 0 < sharpness < float("inf"):
         return hint("the answer is a number above 0")
+    if not len(points):
+        return hint("there are no points, so there is no error either")
     error = soft_error(stump, points, sharpness)
-    if error > SOFT_ERROR:
+    if not error <= SOFT_ERROR:
         return hint(f"the mean error is {error:.4f}, more than {SOFT_ERROR:g}: is it sharp enough?")
     if soft_error(stump, points, sharpness / NEAR) <= SOFT_ERROR:
         return hint(f"the mean error is {error:.4f}, but a smaller sharpness will do, too")
@@ -159,7 +181,20 @@ def check_openscad(answer: object) -> str:
     points = _random([[-0.6, -0.6, -0.1], [0.6, 0.6, 0.1]])
     disc, drill = washer().primitives
     wide = Stump((disc, Cylinder(2 * drill.radius)), *washer().matrices)
-    return _compared(execute(stump).occupancy(points), execute(wide).occupancy(points), points, 0.0)
+    verdict = _compared(execute(stump).occupancy(points), execute(wide).occupancy(points), points, 0.0)
+    if verdict == OK and not _same(stump, wide):
+        return hint("the shape is nearly right, but something else is changed: edit nothing but one number")
+    return verdict
+
+
+def _same(one: Stump, other: Stump) -> bool:
+    """Whether two stumps are written alike, but for the rounding of their numbers."""
+    if list(map(type, one.primitives)) != list(map(type, other.primitives)):
+        return False
+    a, b = one.parameters().detach(), other.parameters().detach()
+    if a.shape != b.shape or not torch.allclose(a, b, rtol=0, atol=1e-9):
+        return False
+    return all(torch.equal(*pair) for pair in zip(one.matrices, other.matrices))
 
 
 def _stump(answer: object, dimensions: int) -> Stump | str:
@@ -197,6 +232,16 @@ def _compared(got: Bool[Tensor, " m"], wanted: Bool[Tensor, " m"], points: Tenso
         if some.any()
     ]
     return hint(f"{differ:,} of {len(points):,} points differ: {'; '.join(parts)}")
+
+
+def _within(stump: Stump, window: list) -> str:
+    """ "ok" if the shape, as far as its primitives reach, stays in a window; told exactly, from its edge."""
+    shape = execute(stump)
+    edge = np.concatenate(shape.outline()) if stump.dimensions == 2 else shape.mesh().vertices
+    edge = torch.tensor(edge, dtype=torch.float64)
+    low, high = torch.tensor(window, dtype=torch.float64)
+    out = ((edge < low) | (edge > high)).any(1)
+    return hint(f"something stands far from the plate, {_around(edge, out)}") if out.any() else OK
 
 
 def _around(points: Tensor, some: Bool[Tensor, " m"]) -> str:

@@ -10,6 +10,9 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 from scipy.spatial import cKDTree
+from torch import Tensor
+
+from .checks import check_count, is_number
 
 FEWEST = 100  # points: fewer do not show what a surface is
 FLAT = 1e-6  # share: thinner clouds lie in one plane
@@ -26,7 +29,8 @@ class CloudError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
-    """Points on the surface of a solid, and the directions that lead out of it there; any length but 0.
+    """Points on the surface of a solid, and the directions that lead out of it there; any length but 0. A point that
+    comes again counts once, with its first normal.
 
     Raises CloudError for no or too few points, numbers that are not finite, points that lie in one plane, and for
     normals that are missing, fewer, or zero.
@@ -40,6 +44,7 @@ class PointCloud:
         _check_points(points)
         if len(normals) != len(points):
             raise CloudError(f"{len(points)} points and {len(normals)} normals", "a normal for each point")
+        points, normals = _different(points, normals)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         if not length.all():
             raise CloudError(f"the normal of point {int(np.argmin(length))} is zero", "a direction")
@@ -77,11 +82,14 @@ def sample_cloud(
     noise     share; each coordinate is off by a normal deviate of this size, and each normal tilted by one of TILT
               times as many radians about both directions across it, as normals are that were estimated from such points
     outliers  of all points, 0 to 1: these lie anywhere in the mesh's bounds instead, and point anywhere
-    Raises CloudError for a mesh without area, and for a noise or outliers out of range.
+    Raises CloudError for what is no mesh or has no area, and for numbers out of range.
     """
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise CloudError(f"the mesh is a {type(mesh).__name__}", "a trimesh.Trimesh")
+    n, seed = check_count("n", n, FEWEST, CloudError), check_count("seed", seed, 0, CloudError)
     if not len(mesh.faces) or not mesh.area > 0:
         raise CloudError(f"a mesh of {len(mesh.faces)} faces and area {mesh.area:g}", "a surface")
-    if not noise >= 0 or not 0 <= outliers <= 1:
+    if not (is_number(noise) and is_number(outliers) and noise >= 0 and 0 <= outliers <= 1):
         raise CloudError(f"noise {noise} and outliers {outliers}", "noise 0 or more, outliers 0 to 1")
     rng = np.random.default_rng(seed)
     points, faces = trimesh.sample.sample_surface(mesh, n, seed=seed)
@@ -97,9 +105,12 @@ def sample_cloud(
 
 def _table(name: str, given) -> np.ndarray:
     try:
-        table = np.asarray(given, dtype=float)
+        made = np.asarray(given.detach().cpu() if isinstance(given, Tensor) else given)
+        table = made.real.astype(float)
     except (TypeError, ValueError):
         raise CloudError(f"{name} are a {type(given).__name__}", "numbers (n, 3)") from None
+    if np.iscomplexobj(made):
+        raise CloudError(f"{name} are complex", "numbers (n, 3)")
     if table.size == 0:
         raise CloudError(f"the cloud has no {name}", "numbers (n, 3)")
     if table.ndim != 2 or table.shape[1] != 3:
@@ -129,3 +140,11 @@ def _check_points(points: np.ndarray) -> None:
     if sizes[2] <= FLAT * sizes[0]:
         what = "on a line" if sizes[1] <= FLAT * sizes[0] else "in a plane"
         raise CloudError(f"all points of the cloud lie {what}", "the surface of a solid")
+
+
+def _different(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Without points that came before, in the same order."""
+    first = np.sort(np.unique(points, axis=0, return_index=True)[1])
+    if len(first) < FEWEST:
+        raise CloudError(f"the cloud has {len(first)} different points", f"at least {FEWEST}")
+    return points[first], normals[first]

@@ -17,7 +17,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .clouds import PointCloud
+from .checks import check_count, is_number
+from .clouds import CloudError, PointCloud
 from .probing import spread, tilt
 from .surfaces import KINDS, Surface, measure, reasonable, through
 
@@ -38,13 +39,26 @@ class Options:
     angle      degrees that its normal may be off; None: three and a half times its noise, 10 to 25
     fewest     share of the cloud's points that make a surface
     trials     threes of points at once
-    patience   rounds of trials that may find nothing in a row"""
+    patience   rounds of trials that may find nothing in a row
+    most       surfaces: detection ends with so many, as on a torus, which no number of these surfaces is made of
+    Raises CloudError for anything else."""
 
     tolerance: float | None = None
     angle: float | None = None
     fewest: float = 0.004
     trials: int = 300
     patience: int = 12
+    most: int = 60
+
+    def __post_init__(self):
+        for name, most in (("tolerance", 1), ("angle", 90), ("fewest", 1)):
+            given = getattr(self, name)
+            if given is None and name != "fewest":
+                continue
+            if not is_number(given) or not 0 < given <= most:
+                raise CloudError(f"{name} is {given!r:.40}", f"a number, more than 0 and at most {most}")
+        for name in ("trials", "patience", "most"):
+            check_count(name, getattr(self, name), 1, CloudError)
 
 
 def detect(cloud: PointCloud, seed: int, options: Options | None = None) -> list[Surface]:
@@ -76,8 +90,8 @@ class _Search:
         self.left = np.ones(len(cloud), bool)
 
     def run(self) -> list[Surface]:
-        surfaces, failures = [], 0
-        while failures < self.options.patience and self.left.sum() >= self.fewest:
+        options, surfaces, failures = self.options, [], 0
+        while len(surfaces) < options.most and failures < options.patience and self.left.sum() >= self.fewest:
             best = self.best()
             failures = 0 if best else failures + 1
             if best:

@@ -17,10 +17,12 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from .arrangement import Arrangement, Term
+from .checks import check_count, is_number
 from .covering import best_cover
 from .searching import Search
 
 EXACT = 1e-9  # shares closer than this are equal
+HEAVIEST = 1e12  # weight: HiGHS takes a cost of 1e20 for infinite, and sums must keep the small ones
 
 
 class SearchError(ValueError):
@@ -78,8 +80,7 @@ def solve(
     """
     start = time.perf_counter()
     arrangement = arrange(inside, target, weights)
-    _check_count("nodes", nodes)
-    _check_seconds(seconds)
+    nodes, seconds = check_limits(nodes, seconds)
     search = Search(arrangement, nodes, seconds - (time.perf_counter() - start))
     search.run()
     return _result(arrangement, search.terms, search.bound, search.method, start)
@@ -90,15 +91,16 @@ def greedy(
     target: Bool[Tensor, " n"],
     weights: Float[Tensor, " n"] | None = None,
     nodes: int = 16,
+    seconds: float = 10.0,
     width: int = 1,
 ) -> Matrices:
-    """Matrices by a greedy cover, arguments as in `solve`. The bound is what no matrices could do better for lack of
-    primitives: points in the same primitives, of which some should be in and others out."""
+    """Matrices by a greedy cover, arguments as in `solve`: after `seconds` no node is added. The bound is what no
+    matrices could do better for lack of primitives: points in the same primitives, some to be in and others out."""
     start = time.perf_counter()
     arrangement = arrange(inside, target, weights)
-    _check_count("nodes", nodes)
-    _check_count("width", width)
-    terms = best_cover(arrangement, nodes, width)
+    nodes, seconds = check_limits(nodes, seconds)
+    width = check_count("width", width, 1, SearchError)
+    terms = best_cover(arrangement, nodes, width, deadline=start + seconds)
     return _result(arrangement, terms, arrangement.floor, "greedy", start)
 
 
@@ -151,14 +153,13 @@ def _weights(given, points: int) -> np.ndarray:
         raise SearchError(f"weights have the shape {weights.shape}", f"({points},), one for each point")
     if not (np.isfinite(weights).all() and (weights >= 0).all() and weights.any()):
         raise SearchError("weights that are negative, not finite, or all 0", "at least 0, and some more")
+    if weights.max() > HEAVIEST:
+        raise SearchError(f"a weight of {weights.max():g}", f"at most {HEAVIEST:g}: only their ratios matter")
     return weights
 
 
-def _check_count(name: str, given) -> None:
-    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
-        raise SearchError(f"{name} is {given!r:.40}", "a whole number, 1 or more")
-
-
-def _check_seconds(given) -> None:
-    if isinstance(given, bool) or not isinstance(given, (int, float)) or not 0 < given < float("inf"):
-        raise SearchError(f"seconds is {given!r:.40}", "a time limit, more than 0")
+def check_limits(nodes, seconds) -> tuple[int, float]:
+    """At most so many nodes, and the time limit. Raises SearchError."""
+    if not is_number(seconds) or seconds <= 0:
+        raise SearchError(f"seconds is {seconds!r:.40}", "a time limit, more than 0")
+    return check_count("nodes", nodes, 1, SearchError), float(seconds)

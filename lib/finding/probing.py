@@ -17,8 +17,7 @@ from .clouds import CloudError, PointCloud
 
 NEAR = 12  # neighbours that tell a point's area
 AT_ONCE = 1 << 22  # pairs of points in one step
-
-
+MOST = 20_000  # points of a cloud that labels are told from
 AROUND = 0.15  # share: so far around the bounds it must be empty, too
 ENOUGH = 0.25  # of the probes below the surface must be in the solid
 DOUBT = 0.2  # winding numbers so near to 1/2 tell nothing
@@ -32,14 +31,23 @@ class Probes:
     inside: Bool[np.ndarray, " n"]
 
 
-def probes(cloud: PointCloud, n: int, seed: int, step: float) -> Probes:
+def probes(
+    cloud: PointCloud,
+    n: int,
+    seed: int,
+    step: float,
+    expected: str = "points all over a surface, with outward normals",
+) -> Probes:
     """About n test points with their labels, without those in doubt: half at `step` (a length) from the cloud's points,
     along their normals or against them; a quarter anywhere in the bounds, and a quarter in wider ones.
 
-    Raises CloudError where nothing is inside.
+    Of a cloud of more than MOST points, so many are looked at, chosen at random.
+    Raises CloudError where nothing is inside, with what is `expected` for that.
     """
     rng = np.random.default_rng(seed)
     low, high = cloud.bounds
+    if len(cloud) > MOST:
+        cloud = cloud[np.sort(rng.choice(len(cloud), MOST, replace=False))]
     widths = np.repeat([[step], [AROUND * cloud.diagonal]], [n // 4, n - n // 2 - n // 4], axis=0)
     anywhere = rng.uniform(low - widths, high + widths)
     at, side = rng.integers(len(cloud), size=n // 2), rng.choice([-step, step], (n // 2, 1))
@@ -49,7 +57,7 @@ def probes(cloud: PointCloud, n: int, seed: int, step: float) -> Probes:
     if (near[side[:, 0] > 0] < -0.5 - DOUBT).mean() > ENOUGH:
         raise CloudError("the normals point into the solid", "outward ones: -normals")
     if (near[side[:, 0] < 0] > 0.5 + DOUBT).mean() < ENOUGH:
-        raise CloudError("the cloud has no inside", "points all over the surface, with outward normals")
+        raise CloudError("the cloud has no inside", expected)
     sure = np.abs(number - 0.5) > DOUBT
     return Probes(points[sure], number[sure] > 0.5)
 

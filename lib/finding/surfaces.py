@@ -205,4 +205,4 @@ def _meeting(p, u, q, v) -> np.ndarray:
 def _lengths(vectors: np.ndarray) -> np.ndarray:
     """None is 0, so that all can be divided by; how small the least ones are depends on no unit."""
     lengths = np.sqrt((vectors**2).sum(-1))
-    return np.maximum(lengths, TINY * lengths.max(initial=0.0) or 1.0)
+    return np.maximum(lengths, max(np.finfo(float).tiny, TINY * lengths.max(initial=0.0)))

@@ -1,0 +1,56 @@
+"""What commands that measure have in common: their options, a file that is known to be writable, a table, the end."""
+
+import argparse
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import torch
+
+from data_scripts.ending import exit_code
+from data_scripts.journal import write_whole
+from lib.datasets import REPOSITORY, DataError
+
+INTERRUPTED = "interrupted; nothing was written"
+
+
+def command(
+    about: str,
+    result: Path,
+    quick: str,
+    measure: Callable[[bool], dict],
+    told: Callable[[dict], str],
+    arguments: list[str] | None = None,
+) -> int:
+    """Measure, print and write, as a command with --quick and --out. Returns the exit code: 0 finished, 1 nothing
+    could be written, 130 interrupted.
+
+    about    the help; quick  that of --quick
+    result   where the figures go without --out
+    measure  whether it is to be quick -> the figures; told  the figures as a text
+    """
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help=quick)
+    default = f"the JSON (default: {result.relative_to(REPOSITORY)})"
+    parser.add_argument("--out", type=Path, default=result, help=default)
+    options = parser.parse_args(arguments)
+
+    def work() -> None:
+        check_writable(options.out)  # told before minutes of work, not after
+        torch.set_num_threads(1)
+        found = measure(options.quick)
+        print(told(found))
+        write_whole(options.out, (json.dumps(found, indent=1) + "\n").encode())
+        print(f"kept in {options.out}")
+
+    return exit_code(work, INTERRUPTED)
+
+
+def check_writable(path: Path) -> None:
+    """Makes the folder that the file will be in. Raises DataError or OSError for a file that cannot be written."""
+    if path.is_dir():
+        raise DataError(f"{path} is a folder; expected the name of a file to write")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not os.access(path.parent, os.W_OK) or path.exists() and not os.access(path, os.W_OK):
+        raise DataError(f"{path} cannot be written; expected a file in a folder of yours")

@@ -146,6 +146,10 @@ def test_matrices_are_drawn_as_they_are():
     assert (w_u == PLATE.union[None].numpy()).all()
 
 
+def test_rows_of_matrices_have_names():
+    assert {"F1 square", "F2 circle"} < set(texts(matrices_figure(PLATE)))
+
+
 def test_large_matrices_have_labels_that_fit():
     generator = torch.Generator().manual_seed(0)
     for rows, columns in ((64, 20), (256, 256), (3, 200), (100, 2)):
@@ -213,6 +217,13 @@ def test_a_cloud_has_a_legend_with_counts():
         cloud_figure(points, labels[1:])
     with pytest.raises(ValueError, match="1 names, but a point has the label 1"):
         cloud_figure(points, labels, ["plane"])
+
+
+@pytest.mark.usefixtures("unchecked_shapes")
+def test_twelve_surfaces_of_a_cloud_are_told_apart():
+    figure = cloud_figure(np.zeros((13, 3)), np.arange(-1, 12))
+    keys = {tuple(handle.get_color()) for handle in figure.legends[0].legend_handles}
+    assert len(keys) == 13
 
 
 def test_a_search_has_a_curve_a_method():

@@ -130,6 +130,25 @@ def test_bad_cells_are_refused(widget, cells):
     assert widget.text == TEXT and widget.cells == "01111010"
 
 
+def test_a_text_sets_the_stump(widget):
+    widget.toggle("F2 in S2")
+    other = TEXT.replace("0.15", "0.25")
+    widget.text = other.replace("0.25", "2.5e-1")
+    assert widget.text == other and widget.stump == parse(other)
+    assert widget.past == [] and widget.cells == "01111010"
+
+
+@pytest.mark.parametrize(
+    "text, error, said",
+    [("rubbish", ProgramError, "rubbish"), ("F1 = sphere(radius=1)\nT = nothing", ValueError, "of space")],
+)
+def test_a_bad_text_is_refused(widget, text, error, said):
+    stump = widget.stump
+    with pytest.raises(error, match=said):
+        widget.text = text
+    assert widget.text == TEXT and widget.stump is stump
+
+
 @pytest.mark.usefixtures("unchecked_shapes")
 def test_what_cannot_be_shown_is_refused():
     with pytest.raises(ProgramError, match="the text ends"):

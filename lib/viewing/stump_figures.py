@@ -21,6 +21,7 @@ from lib.viewing.stump_pictures import color_of, picture_points, pictures_of
 MOST = 12  # primitives, and nodes, that fit a figure of the layers
 FINE = 4  # samples of a dot of a picture, across and down: edges come out smooth
 _SWITCH, _CAPTION, _EDGE = 46, 18, 6  # dots: between O and F, below a picture, around the page
+_NAMED = 128  # dots: left of W_I, where rows of matrices have the names of primitives
 _WIRE = {"color": "#9aa3b0", "linewidth": 1.2, "solid_capstyle": "butt", "zorder": 0.5}
 
 
@@ -142,7 +143,7 @@ def _explain(ax: Axes, plan: _Plan) -> None:
     if plan.columns:
         write(ax, "W_I", (plan.column(0) + plan.column(plan.columns) - GAP) / 2, 6, 8.5, color=SOFT)
     beside = {"x": plan.complements + plan.side, "size": 8.5, "ha": "right", "va": "center", "color": SOFT}
-    which = "S, intersections: where\nall dotted F of a column are" if plan.wordy else "S, intersections"
+    which = "S, intersections: where\nall F with a dark dot are" if plan.wordy else "S, intersections"
     write(ax, which, y=plan.row(plan.rows) + plan.side / 2, **beside)
     write(ax, "W_U, which S are united" if plan.wordy else "W_U, the union", y=plan.union, **beside)
     write(ax, "T, the shape", plan.shape + plan.large / 2, plan.union + 14, 8.5)
@@ -162,7 +163,10 @@ def matrices_figure(stump: Stump) -> Figure:
     """W_C, W_I and W_U as they lie around the layers: a row a primitive, a column a node; dark is 1, light is 0."""
     rows, columns = stump.intersection.shape
     cell = min(22.0, (WIDTH - 130) / max(1, columns), WIDTH / rows)  # dots
-    left, top, gap = 82, 44, 10
+    named = (
+        _step(cell) == 1 and _NAMED + columns * cell + 14 <= WIDTH
+    )  # is there room for more than a number?
+    left, top, gap = _NAMED if named else 82, 44, 10
     union = top + rows * cell + gap
     _, ax = page(max(round(left + columns * cell + 14), 220), round(union + max(cell, 14) + 6), 1)
     _matrix(ax, stump.complement[:, None], left - gap - cell, top, cell)
@@ -173,7 +177,8 @@ def matrices_figure(stump: Stump) -> Figure:
     write(ax, f"W_I, {rows} x {columns}", left, 12, **(style | {"ha": "left"}))
     write(ax, "W_U", left - gap, union + cell / 2, **(style | {"ha": "right"}))
     for k in range(0, rows, _step(cell)):
-        write(ax, f"F{k + 1}", left - gap - cell - 5, top + (k + 0.5) * cell, 8, ha="right", va="center")
+        name = f"F{k + 1} {stump.primitives[k].name}" if named else f"F{k + 1}"
+        write(ax, name, left - gap - cell - 5, top + (k + 0.5) * cell, 8, ha="right", va="center")
     for c in range(0, columns, _step(cell, 7 * len(f"S{columns}") + 6)):
         write(ax, f"S{c + 1}", left + (c + 0.5) * cell, 32, 8, va="center")
     return ax.figure

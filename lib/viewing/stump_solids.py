@@ -20,8 +20,9 @@ from lib.viewing.camera import Camera
 from lib.viewing.figure import bounds_of, draw_points, show
 from lib.viewing.voxels import COLOR, VIEW
 
-# Told apart by colour-blind readers too, neighbours above all.
+# Told apart by colour-blind readers too, neighbours above all: the first eight. With more than all, they come again.
 COLORS = ("#0072b2", "#e08700", "#009e73", "#b5588f", "#56b4e9", "#d55e00", "#8a7f2d", "#5b6475")
+COLORS += ("#7b1e3a", "#e6d200", "#8fd175", "#14181f")
 NONE = "#c3c9d3"  # of points that belong to no primitive
 _TINT = 0.45  # of white in the colours of surfaces: shades are seen on them, too
 _TURN = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # rows: x, y, z of the picture

@@ -33,7 +33,7 @@ class StumpWidget(anywidget.AnyWidget):
 
     It starts from a Stump or its text. `reset` goes back to that, `undo` to what was before the last change.
     stump   the present one. Setting another one begins anew: there is nothing to undo then.
-    text    that, written.
+    text    that, written. Setting another text is setting another stump.
     cells   all switches as "0" and "1": W_C, then W_I row by row, then W_U.    names   what each of them is called.
     window  lowest and highest x and y to show; that of `picture_window` if left out.
     Raises ProgramError for a bad text, TypeError for what is no stump, and ValueError for one of space or with more
@@ -102,13 +102,17 @@ class StumpWidget(anywidget.AnyWidget):
 
     @traitlets.validate("stump")
     def _check_stump(self, proposal) -> Stump:
-        stump = proposal.value
-        if stump.dimensions != 2:
-            raise ValueError("found a stump of space; expected one of the plane")
-        if max(stump.intersection.shape) > MOST:
-            rows, columns = stump.intersection.shape
-            raise ValueError(f"found {rows} primitives and {columns} nodes; expected at most {MOST} of each")
-        return stump
+        return _drawable(proposal.value)
+
+    @traitlets.validate("text")
+    def _check_text(self, proposal) -> str:
+        return _drawable(parse(proposal.value)).to_text()
+
+    @traitlets.observe("text")
+    def _on_text(self, change) -> None:
+        """Nothing to do where the text has followed the stump."""
+        if change.new != self.stump.to_text():
+            self.stump = parse(change.new)
 
     @traitlets.validate("cells")
     def _check_cells(self, proposal) -> str:
@@ -150,6 +154,15 @@ class StumpWidget(anywidget.AnyWidget):
             bits = torch.tensor([cell == "1" for cell in change.new])
             w_c, w_i, w_u = bits.split([rows, rows * columns, columns])
             self.stump = Stump(self.stump.primitives, w_c, w_i.view(rows, columns), w_u)
+
+
+def _drawable(stump: Stump) -> Stump:
+    if stump.dimensions != 2:
+        raise ValueError("found a stump of space; expected one of the plane")
+    if max(stump.intersection.shape) > MOST:
+        rows, columns = stump.intersection.shape
+        raise ValueError(f"found {rows} primitives and {columns} nodes; expected at most {MOST} of each")
+    return stump
 
 
 def _cells_of(stump: Stump) -> str:

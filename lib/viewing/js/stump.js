@@ -96,7 +96,7 @@ function build({ rows, columns, names, side }, primitives, flip) {
   const words = wordy ? ["primitives", "W_C", "complement"] : ["O", "W_C", "F"];
   const heads = words.map((text, k) => at(1, k + 1, "stump-head", text));
   if (columns) heads.push(at(1, `4 / auto / span ${columns}`, "stump-head", "W_I"));
-  const says = [["S, intersections: where all dotted F of a column are", 2], ["W_U, which S are united", 3]].map(
+  const says = [["S, intersections: where all F with a dark dot are", 2], ["W_U, which S are united", 3]].map(
     ([text, row]) => at(count + row, "1 / span 1 / span 3", "stump-says", text),
   );
   const parts = [

@@ -72,12 +72,12 @@ def by_file(benchmarks: list[dict]) -> dict[str, list[dict]]:
     return files
 
 
-def keep(name: str, table: list[dict], bench: dict) -> Path:
-    """Write results/NAME_speed.json."""
+def keep(name: str, table: list[dict], bench: dict, measured: str) -> Path:
+    """Write results/NAME_speed.json; measured: the commit."""
     once = {key: table[0][key] for key in ("data", "torch", "threads")}
     result = {
         "date": bench["datetime"][:10],
-        "commit": commit(),
+        "commit": measured,
         "cpu": bench["machine_info"].get("cpu", {}).get("brand_raw", "unknown"),
         "cpu_count": os.cpu_count(),
         **once,
@@ -96,13 +96,14 @@ def main(path: str) -> None:
     tables = {name: table for name, table in tables.items() if table}
     if not tables:
         sys.exit(f"{path} holds no benchmark of tests/bench_*.py")
+    measured = commit()  # now: the first file that is written would make it dirty
     for name, table in tables.items():
         print(printed(table))
         first = table[0]
         print(
             f"{first['data']}, {first['threads']} thread, torch {first['torch']}; authors: on a machine like this"
         )
-        print(f"kept in {keep(name, table, bench).relative_to(ROOT)}\n")
+        print(f"kept in {keep(name, table, bench, measured).relative_to(ROOT)}\n")
 
 
 if __name__ == "__main__":

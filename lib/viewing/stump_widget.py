@@ -64,6 +64,7 @@ class StumpWidget(anywidget.AnyWidget):
 
     @property
     def names(self) -> list[str]:
+        """What `toggle` takes: "not F1" …, "F1 in S1" …, "S1 in T" …."""
         rows, columns = self.stump.intersection.shape
         primitives, nodes = [f"F{k + 1}" for k in range(rows)], [f"S{c + 1}" for c in range(columns)]
         joined = [f"{primitive} in {node}" for primitive in primitives for node in nodes]

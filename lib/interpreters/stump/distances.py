@@ -104,3 +104,10 @@ def _to_segment(points: Points, start: Sizes, end: Sizes) -> Distances:
     length = (along**2).sum(-1, keepdim=True).clamp(min=torch.finfo(points.dtype).tiny)
     share = ((offset * along).sum(-1, keepdim=True) / length).clamp(0, 1)
     return norm(offset - share * along)
+
+
+WHOLE = {  # by the primitives' names
+    "box": box, "sphere": sphere, "cylinder": capped_cylinder, "cone": capped_cone,
+    "square": box, "circle": sphere, "triangle": triangle, "halfplane": half_plane,
+}  # fmt: skip
+ENDLESS = {"cylinder": cylinder, "cone": cone}  # without a height

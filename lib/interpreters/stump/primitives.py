@@ -130,7 +130,8 @@ class Primitive:
         return self._formula()(self.local(points), self.sizes)
 
     def _formula(self) -> Callable[[Tensor, Tensor], Tensor]:
-        raise NotImplementedError
+        endless = "height" in self.counts and self.height is None
+        return (formulas.ENDLESS if endless else formulas.WHOLE)[self.name]
 
     def __eq__(self, other) -> bool:
         """The same kind with the same numbers."""
@@ -154,20 +155,16 @@ class Box(Primitive):
     name = "box"
     counts = {"half": 3}
 
-    def _formula(self):
-        return formulas.box
-
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Primitive):
+    """A ball around the translation. Its rotation has no effect, and is there because the paper's has one."""
+
     radius: Numbers
     translation: Numbers = None
     rotation: Numbers = None
     name = "sphere"
     counts = {"radius": 1}
-
-    def _formula(self):
-        return formulas.sphere
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,9 +178,6 @@ class Cylinder(Primitive):
     name = "cylinder"
     counts = {"radius": 1, "height": 1}
 
-    def _formula(self):
-        return formulas.cylinder if self.height is None else formulas.capped_cylinder
-
 
 @dataclass(frozen=True, eq=False)
 class Cone(Primitive):
@@ -195,9 +189,6 @@ class Cone(Primitive):
     rotation: Numbers = None
     name = "cone"
     counts = {"slope": 1, "height": 1}
-
-    def _formula(self):
-        return formulas.cone if self.height is None else formulas.capped_cone
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,21 +202,17 @@ class Square(Primitive):
     dimensions = 2
     counts = {"half": 2}
 
-    def _formula(self):
-        return formulas.box
-
 
 @dataclass(frozen=True, eq=False)
 class Circle(Primitive):
+    """A disc around the translation. Its rotation has no effect."""
+
     radius: Numbers
     translation: Numbers = None
     rotation: Numbers = None
     name = "circle"
     dimensions = 2
     counts = {"radius": 1}
-
-    def _formula(self):
-        return formulas.sphere
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,9 +228,6 @@ class Triangle(Primitive):
     dimensions = 2
     counts = {"left": 1, "right": 1, "height": 1}
 
-    def _formula(self):
-        return formulas.triangle
-
 
 @dataclass(frozen=True, eq=False)
 class HalfPlane(Primitive):
@@ -253,9 +237,6 @@ class HalfPlane(Primitive):
     rotation: Numbers = None
     name = "halfplane"
     dimensions = 2
-
-    def _formula(self):
-        return formulas.half_plane
 
 
 KINDS = {kind.name: kind for kind in (Box, Sphere, Cylinder, Cone, Square, Circle, Triangle, HalfPlane)}

@@ -75,6 +75,7 @@ class _Parser:
         return ScadError(found, *token.at, token.text, expected)
 
     def statement(self) -> Statement:
+        """A module, a function, a parameter or a call."""
         if self.next.text == "module":
             return self.module()
         if self.next.text == "function":
@@ -153,6 +154,7 @@ class _Parser:
             expected = "'}' or a call 'name();'"
 
     def head(self, expected: str) -> tuple[Token, tuple[Argument, ...]]:
+        """The name and the arguments of a call."""
         if self.next.text in OTHER_MODULES:
             raise (
                 self.wrong(expected)
@@ -195,6 +197,7 @@ class _Parser:
         return value
 
     def chain(self, symbols: str, read) -> Expression:
+        """What `read` reads, joined from left to right by the symbols."""
         value, count = read(), 1
         while self.next.kind == "symbol" and self.next.text in symbols:
             symbol = self.take()
@@ -205,6 +208,7 @@ class _Parser:
         return value
 
     def factor(self) -> Expression:
+        """An atom with any signs before it."""
         at, negative = self.next.at, False
         while self.next.text in ("-", "+"):
             negative ^= self.take().text == "-"

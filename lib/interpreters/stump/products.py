@@ -49,6 +49,7 @@ def max_product(
 class _MaxProduct(torch.autograd.Function):
     @staticmethod
     def forward(ctx, w: Tensor, g: Tensor, temperature: float | None) -> Tensor:
+        """R (n, c, m) of w (n, k, c) and g (n, k, m)."""
         result = g.new_zeros(len(g), w.shape[2], g.shape[2])
         scale = (
             torch.empty_like(result) if temperature else result
@@ -63,6 +64,7 @@ class _MaxProduct(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx, gradient: Tensor):
+        """The gradients of w and g; every P_k is made anew."""
         w, g, scale = ctx.saved_tensors
         to_w, to_g = torch.zeros_like(w), torch.empty_like(g)
         for rows, points in _blocks(gradient):

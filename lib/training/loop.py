@@ -1,0 +1,157 @@
+"""One training loop for every network here: on a CPU, a GPU, or several processes, resumable to the last bit.
+
+A `Task` says what is learnt: a network, the batches of an epoch, the loss of a batch. `fit` does the rest: Adam, a
+schedule of its rate, a progress bar, a log line an epoch, a checkpoint an epoch. All randomness is drawn from (seed,
+epoch, batch, process), never from what happened before, so a run that was killed and started again ends with the same
+weights, bit for bit, as one that never stopped (on the same machine, with the same number of threads and processes).
+"""
+
+import json
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import torch
+from lightning_fabric import Fabric
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from .checkpoints import Checkpoint, read_checkpoint, write_checkpoint
+
+EPSILON = 1e-6  # of Adam, as in the ShapeAssembly authors' program
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How long and how fast a network learns.
+
+    epochs   passes over the data
+    batch    items a step, over all processes
+    rate     Adam's learning rate at its highest
+    warmup   share of the steps in which the rate grows from 0 to that
+    last     the rate at the end, as a share of the highest, reached along half a cosine; 1 keeps it constant
+    clip     largest norm of the gradient; a longer one is shortened to it
+    seed     of everything random
+    """
+
+    epochs: int
+    batch: int
+    rate: float
+    warmup: float = 0.0
+    last: float = 1.0
+    clip: float = math.inf
+    seed: int = 0
+
+    def rate_at(self, progress: float) -> float:
+        """The learning rate when a share `progress` of all steps is done."""
+        if progress < self.warmup:
+            return self.rate * progress / self.warmup
+        done = (progress - self.warmup) / (1 - self.warmup) if self.warmup < 1 else 1.0
+        return self.rate * (self.last + (1 - self.last) * (1 + math.cos(math.pi * done)) / 2)
+
+
+class Task(Protocol):
+    """What is learnt."""
+
+    network: nn.Module
+    about: dict  # JSON: data and settings that must be the same when a run goes on
+
+    def __len__(self) -> int:
+        """Number of training items."""
+
+    def loss(
+        self, network: nn.Module, picks: Sequence[int], noise: torch.Generator, progress: float
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Loss of some items, and its terms by name for the log; `noise` is what all chance comes from."""
+
+    def report(self, network: nn.Module) -> dict[str, float]:
+        """Figures for the log at the end of an epoch, such as the loss on other data."""
+
+
+def fit(task: Task, schedule: Schedule, folder: Path, fabric: Fabric | None = None) -> list[dict]:
+    """Train `task.network`; returns the log, one dict an epoch. Goes on from the checkpoint in `folder`, if any.
+
+    Raises CheckpointError for a checkpoint that is damaged or of another run.
+    """
+    fabric = fabric or Fabric()
+    fabric.launch()
+    # Plain Adam: the fused one gives other last bits on other processors.
+    adam = torch.optim.Adam(task.network.parameters(), lr=schedule.rate, eps=EPSILON)
+    network, optimizer = fabric.setup(task.network, adam)
+    about = json.loads(json.dumps(task.about | asdict(schedule), default=str))
+    path = folder / "checkpoint.safetensors"
+    log: list[dict] = []
+    if path.exists():
+        log = read_checkpoint(path, task.network, adam, about).log
+    run = _Run(task, schedule, fabric, network, optimizer)
+    for epoch in range(len(log), schedule.epochs):
+        log = [*log, run.epoch(epoch, log[-1] if log else {})]
+        if fabric.is_global_zero:
+            write_checkpoint(path, task.network, adam, Checkpoint(about, log))
+            _write_log(folder / "log.jsonl", log)
+        fabric.barrier()
+    return log
+
+
+def batches(count: int, schedule: Schedule, epoch: int) -> list[np.ndarray]:
+    """Item numbers of an epoch's batches, in a random order that (seed, epoch) decides."""
+    order = np.random.default_rng([schedule.seed, epoch]).permutation(count)
+    return np.array_split(order, math.ceil(count / schedule.batch))
+
+
+@dataclass
+class _Run:
+    task: Task
+    schedule: Schedule
+    fabric: Fabric
+    network: nn.Module
+    optimizer: torch.optim.Optimizer
+
+    def epoch(self, epoch: int, before: dict) -> dict:
+        """One pass over the data: mean terms of the loss, figures of the task, seconds."""
+        start = time.perf_counter()
+        self.network.train()
+        picks = batches(len(self.task), self.schedule, epoch)
+        shown = f"epoch {epoch + 1}/{self.schedule.epochs}"
+        bar = tqdm(picks, desc=shown, disable=None if self.fabric.is_global_zero else True, leave=False)
+        sums: dict[str, Tensor] = {}
+        for number, batch in enumerate(bar):
+            progress = (epoch + number / len(picks)) / self.schedule.epochs
+            terms = self.step(batch, [self.schedule.seed, epoch, number], progress)
+            for name, value in terms.items():
+                sums[name] = sums.get(name, 0) + value.detach()
+            if number % 10 == 0:
+                bar.set_postfix(loss=f"{sums['loss'].item() / (number + 1):.2f}")
+        means = {name: self.fabric.all_reduce(value).item() / len(picks) for name, value in sums.items()}
+        self.network.eval()
+        seconds = before.get("seconds", 0.0) + time.perf_counter() - start
+        found = means | self.task.report(self.task.network)
+        return {"epoch": epoch + 1, **_rounded(found), "seconds": round(seconds, 1)}
+
+    def step(self, batch: np.ndarray, seed: list[int], progress: float) -> dict[str, Tensor]:
+        """One update of the weights; each process takes its share of the batch."""
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.schedule.rate_at(progress)
+        rank, world = self.fabric.global_rank, self.fabric.world_size
+        entropy = np.random.SeedSequence([*seed, rank]).generate_state(1)[0]
+        noise = torch.Generator().manual_seed(int(entropy))
+        own = batch[rank::world]
+        loss, terms = self.task.loss(self.network, own if len(own) else batch[:1], noise, progress)
+        self.optimizer.zero_grad()
+        self.fabric.backward(loss)
+        if math.isfinite(self.schedule.clip):
+            self.fabric.clip_gradients(self.network, self.optimizer, max_norm=self.schedule.clip)
+        self.optimizer.step()
+        return {"loss": loss, **terms}
+
+
+def _rounded(figures: dict[str, float]) -> dict[str, float]:
+    return {name: float(f"{value:.6g}") for name, value in figures.items()}
+
+
+def _write_log(path: Path, log: list[dict]) -> None:
+    path.write_text("".join(json.dumps(row) + "\n" for row in log), encoding="utf-8")

@@ -154,9 +154,9 @@ class LineDecoder(nn.Module):
 class ProgramVAE(nn.Module):
     """Encoder and decoder. `forward` is for training; `lib.models.writing` lets the decoder write."""
 
-    def __init__(self, config: ProgramVAEConfig | None = None):
+    def __init__(self, config: ProgramVAEConfig = ProgramVAEConfig()):  # noqa: B008 - it is frozen
         super().__init__()
-        self.config = config = config or ProgramVAEConfig()
+        self.config = config
         hidden, slope = config.hidden, config.slope
         self.read_line = mlp(WIDTH, hidden, hidden, hidden, slope=slope)
         self.reader = nn.GRU(hidden, hidden)

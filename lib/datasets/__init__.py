@@ -1,6 +1,7 @@
 """Where programs, part graphs and masks come from: real or made sets where they were put, else what travels with lib/.
 
     chairs = shapeassembly("chair", split="train")     a sequence of ShapeAssembly Program
+    flat = shapeassembly("chair", "train", "flat")     the same, rewritten without hierarchy: an ablation
     graphs = part_graphs("chair")                      a sequence of PartGraph
     random = csg_programs(2, split="train")            a sequence of CSG Program, and all their tokens
     masks = silhouettes(split="train")                 64x64 masks of furniture, without programs; logos() likewise

@@ -1,12 +1,19 @@
-"""ShapeAssembly programs: the authors' real ones where they were fetched, else the project's own and variations."""
+"""ShapeAssembly programs: the authors' real ones where they were fetched, else the project's own and variations.
 
+Both also rewritten for the ablations of the paper's section 7.1: see `lib.extractor.rewriting`.
+"""
+
+import hashlib
 import zlib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import torch
 
+from lib.extractor.rewriting import ABLATIONS, rewrite_many
 from lib.interpreters.shapeassembly import Program, ProgramError, parse
 
 from .base import CATEGORIES, DataError, DataSet, choose, data_root
@@ -14,49 +21,78 @@ from .base import CATEGORIES, DataError, DataSet, choose, data_root
 SPLITS = ("train", "val")
 EMBEDDED_SIZES = {"train": 40, "val": 8}  # programs a category
 SCALE_RANGE = (0.8, 1.25)  # how far a variation stretches or shrinks an axis
+ABLATED = "shapeassembly-ablations"  # folder below the data root
 EXAMPLES = Path(__file__).parents[1] / "examples" / "shapeassembly"
 
 
 class ProgramSet(DataSet):
-    """Programs; asking for one that is damaged raises DataError."""
+    """Programs; asking for one that is damaged raises DataError. `files` has the path of each that is read from one."""
+
+    files: Mapping[str, Path] = MappingProxyType({})
+
+    def __getitem__(self, index):
+        found = super().__getitem__(index)
+        if isinstance(index, slice):
+            found.files = self.files
+        return found
+
+    def digest(self) -> str:
+        """SHA-256 of ids and texts, which tells whether anything changed; files are not parsed for it."""
+        digest = hashlib.sha256()
+        for program_id in self.ids:
+            text = _bytes(self.files[program_id]) if self.files else self._load(program_id).to_text().encode()
+            digest.update(f"{program_id} {len(text)}\n".encode() + text)
+        return digest.hexdigest()
 
     def describe(self) -> str:
         """One sentence: how many programs, of what, and where they come from."""
         if self.source == "real":
             return f"{len(self)} real {self.name} programs of the ShapeAssembly data set."
+        if self.source == "made":
+            return f"{len(self)} {self.name} programs, rewritten from the real ones of the ShapeAssembly data set."
         return (
             f"{len(self)} embedded {self.name} programs: the project's own examples and seeded variations of them "
             "(fetch the real ones with: python -m data_scripts.fetch_shapeassembly)."
         )
 
 
-def shapeassembly(category: str | None = None, split: str | None = None) -> ProgramSet:
+def shapeassembly(
+    category: str | None = None, split: str | None = None, ablation: str | None = None
+) -> ProgramSet:
     """ShapeAssembly programs: real ones when they were fetched, else embedded ones; `.source` says which.
 
     category  "chair", "table", "storage", or None for all three.
     split     "train", "val", or None for both.
-    Raises DataError for another category or split, and for real data that is damaged.
+    ablation  None, or "flat", "no_order", "no_align", "no_macros": the programs rewritten without that. Where the
+              real ones are, rewriting them is a script's work and the source is then "made"; embedded ones are
+              rewritten here.
+    Raises DataError for another category, split or ablation, for real data that is damaged, and for an ablation of it
+    that was not made.
     """
     categories = choose("category", category, CATEGORIES)
     splits = choose("split", split, SPLITS)
-    name = " ".join(filter(None, [category, split])) or "furniture"
-    folder = data_root() / "shapeassembly"
-    if not folder.is_dir():
+    if ablation is not None:
+        choose("ablation", ablation, ABLATIONS)
+    name = " ".join(filter(None, [ablation, category, split])) or "furniture"
+    if not (data_root() / "shapeassembly").is_dir():
         programs = {}
         for each in categories:
             for part in splits:
-                programs |= _embedded(each, part)
+                programs |= _embedded(each, part) if ablation is None else _rewritten(each, part, ablation)
         return ProgramSet(programs, programs.__getitem__, "embedded", name)
+    folder, again = _real_folder(ablation)
     files = {}
     for each in categories:
         for part in splits:
-            files |= _real(folder, each, part)
+            files |= _real(folder, each, part, again)
 
     @cache
     def load(program_id: str) -> Program:
         return _read(files[program_id])
 
-    return ProgramSet(files, load, "real", name)
+    programs = ProgramSet(files, load, "real" if ablation is None else "made", name)
+    programs.files = files
+    return programs
 
 
 def examples() -> dict[str, Program]:
@@ -98,21 +134,34 @@ def _read(path: Path) -> Program:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from error
 
 
-def _real(folder: Path, category: str, split: str) -> dict[str, Path]:
-    """Program id -> file, in the order of the split's list; every file is known to exist."""
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _real_folder(ablation: str | None) -> tuple[Path, str]:
+    """Where the real programs or those of an ablation lie, and what to do if they do not."""
+    if ablation is None:
+        fetch_again = "fetch the data again: python -m data_scripts.fetch_shapeassembly"
+        return data_root() / "shapeassembly", fetch_again
+    make_them = f"make them: python -m data_scripts.make_ablations --ablations {ablation}"
+    return data_root() / ABLATED / ablation, make_them
+
+
+def _real(folder: Path, category: str, split: str, again: str) -> dict[str, Path]:
+    """Program id -> file, in the order of the split's list; every file is known to exist. `again` says how."""
     listing = folder / "splits" / category / f"{split}.txt"
-    fetch_again = "fetch the data again: python -m data_scripts.fetch_shapeassembly"
     try:
         ids = listing.read_text(encoding="utf-8").split()
         present = {path.stem for path in (folder / category).iterdir()}
     except (OSError, UnicodeDecodeError) as error:
-        raise DataError(
-            f"{listing}: cannot be read, or its programs cannot ({error}); {fetch_again}"
-        ) from error
+        raise DataError(f"{listing}: cannot be read, or its programs cannot ({error}); {again}") from error
     for line, program_id in enumerate(ids, start=1):
         if program_id not in present:
             raise DataError(
-                f"{listing}, line {line}: there is no program {category}/{program_id}.txt; {fetch_again}"
+                f"{listing}, line {line}: there is no program {category}/{program_id}.txt; {again}"
             )
     return {program_id: folder / category / f"{program_id}.txt" for program_id in ids}
 
@@ -130,6 +179,14 @@ def _embedded(category: str, split: str) -> dict[str, Program]:
         name = names[len(programs) % len(names)]
         programs[f"{name}-{split}-{len(programs):02d}"] = vary(originals[name], rng)
     return programs
+
+
+@cache
+def _rewritten(category: str, split: str, ablation: str) -> dict[str, Program]:
+    """The embedded programs that can be rewritten for an ablation."""
+    programs = _embedded(category, split)
+    found = rewrite_many(list(programs.values()), ablation, list(programs), category)
+    return {name: each.program for name, each in zip(programs, found) if each.program}
 
 
 def vary(program: Program, rng: np.random.Generator) -> Program:

@@ -43,7 +43,7 @@ def survey(
     alike   how exact copies must be, see `symmetry`
     """
     facts = look(seen_from(node.box, node.children), node.box.size, category, options)
-    if options.macros and level < LEVELS:
+    if options.macros and options.hierarchy and level < LEVELS:
         joined = join_components(facts, alike, lambda c: holds_together(c, facts, category, options))
         if len(joined) != len(facts.parts):
             facts = look(joined, node.box.size, category, options)

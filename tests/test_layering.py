@@ -15,7 +15,7 @@ MAY_IMPORT = {  # part of lib -> the parts it may import beside itself
     "models": LANGUAGES,
     "metrics": LANGUAGES,
     "finding": ["metrics", *LANGUAGES],
-    "training": [*GEOMETRY, *LANGUAGES],
+    "training": ["datasets", *GEOMETRY, *LANGUAGES],
     "viewing": [*GEOMETRY, *LANGUAGES],
     "exercises": [*GEOMETRY, *LANGUAGES],
     "furniture": ["extractor", *LANGUAGES],

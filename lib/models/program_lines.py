@@ -19,13 +19,18 @@ Cuboids are numbered as they are declared: 0 is the bbox, 1 is cube0, … Fields
 paper names the fields in another order; this one is that of the authors' program.
 """
 
-import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from ..interpreters.shapeassembly import (
-    Attach, Block, Cuboid, Program, ProgramError, Reflect, Squeeze, Translate,
-)  # fmt: skip
+    Attach,
+    Block,
+    Cuboid,
+    ProgramError,
+    Reflect,
+    Squeeze,
+    Translate,
+)
 from ..interpreters.shapeassembly.program import AXES, BBOX, FACES, Statement
 
 COMMANDS = ("start", "Cuboid", "attach", "reflect", "translate", "squeeze", "end")

@@ -80,7 +80,7 @@ class ProgramTable:
                 name_of[int(self.parent[node])] = f"Program_{count[program]}"
             count[program] += 1
         for node, program in enumerate(self.program):
-            start, stop = self.first[node], self.first[node + 1]
+            start, stop = self.first[node : node + 2].tolist()
             found[program].append(self._block(name_of[int(self.parent[node])], start, stop, name_of))
         return [tuple(blocks) for blocks in found]
 
@@ -131,7 +131,13 @@ class Level:
 
 
 def batch_of(table: ProgramTable, picks: Sequence[int]) -> list[Level]:
-    """The levels of some programs of the table, roots first."""
+    """The levels of some programs of the table, roots first.
+
+    Raises ValueError for no programs, one that is picked twice, and numbers that the table does not have.
+    """
+    numbers = sorted(int(pick) for pick in picks)
+    if not numbers or numbers[0] < 0 or numbers[-1] >= len(table) or len(set(numbers)) < len(numbers):
+        raise ValueError(f"found picks {numbers}; expected different programs from 0 to {len(table) - 1}")
     order = np.full(len(table), -1, dtype=np.int64)
     order[np.asarray(picks, dtype=np.int64)] = np.arange(len(picks))
     chosen = np.flatnonzero(order[table.program] >= 0)

@@ -1,22 +1,24 @@
-"""A run that was stopped, on disk: weights, Adam's moments, settings and log in one safetensors file, no pickles.
+"""A training that was stopped, on disk: weights, Adam's moments, settings and log, by `lib.models.weights.write`.
 
 The file is written whole under another name and then renamed: a run that is killed leaves the last checkpoint or the
 one before, never half of one.
 """
 
-import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 
-from ..models.weights import CheckpointError
+from ..models.weights import CheckpointError, read, write
 
-KIND = "shape-programs training run"
+KIND = "training run"
+NETWORK, ADAM = "network", "adam"  # what the names of arrays begin with
+MOMENTS = (
+    "step",
+    "exp_avg",
+    "exp_avg_sq",
+)  # torch's names: steps taken, running means of gradient and its square
 
 
 @dataclass(frozen=True)
@@ -31,16 +33,11 @@ def write_checkpoint(
     path: Path, network: nn.Module, optimizer: torch.optim.Optimizer, checkpoint: Checkpoint
 ) -> None:
     """Put a run at the end of an epoch on disk."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    tensors = {f"network.{name}": value for name, value in network.state_dict().items()}
-    tensors |= _moments(network, optimizer)
-    texts = {"kind": KIND, "about": json.dumps(checkpoint.about), "log": json.dumps(checkpoint.log)}
-    part = path.with_name(f"half-{os.getpid()}.part")
-    try:
-        save_file({name: value.detach().cpu().contiguous() for name, value in tensors.items()}, part, texts)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    tensors = {f"{NETWORK}.{name}": value for name, value in network.state_dict().items()}
+    for name, weight in network.named_parameters():
+        for moment, value in optimizer.state.get(weight, {}).items():
+            tensors[f"{ADAM}.{moment}.{name}"] = value
+    write(path, tensors, KIND, {"about": checkpoint.about, "log": checkpoint.log})
 
 
 def read_checkpoint(
@@ -48,47 +45,66 @@ def read_checkpoint(
 ) -> Checkpoint:
     """Put network and optimizer into the state of a checkpoint.
 
-    Raises CheckpointError for a damaged file and for one of a run with other data or settings than `about`.
+    Raises CheckpointError for a file that is damaged or foreign, and for one of a run with other data, settings or
+    arrays; network and optimizer are then as they were.
     """
-    texts, tensors = _read(path)
-    was, log = json.loads(texts["about"]), json.loads(texts["log"])
-    if other := [key for key in {*was, *about} if was.get(key) != about.get(key)]:
-        changes = ", ".join(f"{key}: {was.get(key)!r} then, {about.get(key)!r} now" for key in sorted(other))
-        raise CheckpointError(f"{path} belongs to another run ({changes}); choose another --out, or remove it")
-    weights = {
-        name.removeprefix("network."): value for name, value in tensors.items() if name.startswith("network.")
-    }
     try:
-        network.load_state_dict(weights)
-        _restore(network, optimizer, tensors)
-    except (RuntimeError, KeyError) as error:
-        raise CheckpointError(f"{path} does not fit the network ({error})") from error
-    return Checkpoint(was, log)
-
-
-def _read(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
-    try:
-        with safe_open(path, "pt") as file:
-            texts = file.metadata() or {}
-            if texts.get("kind") != KIND:
-                raise CheckpointError(f"{path} is no checkpoint of a training run")
-            return texts, {name: file.get_tensor(name) for name in file.keys()}
-    except (SafetensorError, OSError) as error:
-        raise CheckpointError(f"{path} is damaged ({error}); remove it to begin anew") from error
-
-
-def _moments(network: nn.Module, optimizer: torch.optim.Optimizer) -> dict[str, Tensor]:
-    """Adam's step counts and running means, by the names of the weights they belong to."""
-    found = {}
+        tensors, facts = read(path, KIND)
+        checkpoint = _told(path, facts)
+        _same_run(path, checkpoint.about, about)
+        _check(path, tensors, _expected(network, tensors))
+    except CheckpointError as error:
+        raise CheckpointError(f"{error}. Choose another folder, or remove the file to begin anew") from error
+    state = network.state_dict()
+    network.load_state_dict({name: tensors[f"{NETWORK}.{name}"] for name in state})
     for name, weight in network.named_parameters():
-        for key, value in optimizer.state.get(weight, {}).items():
-            found[f"adam.{key}.{name}"] = value
-    return found
+        if f"{ADAM}.step.{name}" in tensors:  # else it has not been used yet
+            kept = {moment: tensors[f"{ADAM}.{moment}.{name}"] for moment in MOMENTS}
+            # Adam keeps its step counts on the CPU, wherever the weights are.
+            optimizer.state[weight] = {
+                moment: value if moment == "step" else value.to(weight) for moment, value in kept.items()
+            }
+    return checkpoint
 
 
-def _restore(network: nn.Module, optimizer: torch.optim.Optimizer, tensors: dict[str, Tensor]) -> None:
+def _told(path: Path, facts: dict) -> Checkpoint:
+    about, log = facts.get("about"), facts.get("log")
+    rows = log if isinstance(log, list) else [None]
+    numbered = [row.get("epoch") if isinstance(row, dict) else None for row in rows]
+    if not isinstance(about, dict) or numbered != list(range(1, len(rows) + 1)):
+        raise CheckpointError(
+            f"{path}: is damaged: found no settings, or no log of epochs 1, 2, … in its header"
+        )
+    return Checkpoint(about, log)
+
+
+def _same_run(path: Path, was: dict, now: dict) -> None:
+    if other := sorted(key for key in {*was, *now} if was.get(key) != now.get(key)):
+        changes = ", ".join(f"{key}: {was.get(key)!r} then, {now.get(key)!r} now" for key in other)
+        raise CheckpointError(f"{path}: belongs to another run ({changes})")
+
+
+def _expected(network: nn.Module, found: dict[str, Tensor]) -> dict[str, Tensor]:
+    """What the arrays should be like: weights, and all moments of each weight that has one."""
+    expected = {f"{NETWORK}.{name}": value for name, value in network.state_dict().items()}
     for name, weight in network.named_parameters():
-        kept = {key: tensors.get(f"adam.{key}.{name}") for key in ("step", "exp_avg", "exp_avg_sq")}
-        if kept["step"] is not None:
-            state = {key: value if key == "step" else value.to(weight) for key, value in kept.items()}
-            optimizer.state[weight] = state
+        names = {moment: f"{ADAM}.{moment}.{name}" for moment in MOMENTS}
+        if any(each in found for each in names.values()):
+            expected |= {
+                each: torch.zeros(()) if moment == "step" else weight for moment, each in names.items()
+            }
+    return expected
+
+
+def _check(path: Path, found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
+    """The same names, and under each the same shape and type, and finite numbers."""
+    for name in sorted({*found, *expected}):
+        have, want = (_described(tensors.get(name)) for tensors in (found, expected))
+        if have != want:
+            raise CheckpointError(f"{path}: found {have} as {name!r}; expected {want}")
+        if not found[name].isfinite().all():
+            raise CheckpointError(f"{path}: found numbers that are not finite in {name!r}")
+
+
+def _described(tensor: Tensor | None) -> str:
+    return "nothing" if tensor is None else f"{str(tensor.dtype)[6:]} {tuple(tensor.shape)}"

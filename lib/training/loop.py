@@ -3,16 +3,19 @@
 A `Task` says what is learnt: a network, the batches of an epoch, the loss of a batch. `fit` does the rest: Adam, a
 schedule of its rate, a progress bar, a log line an epoch, a checkpoint an epoch. All randomness is drawn from (seed,
 epoch, batch, process), never from what happened before, so a run that was killed and started again ends with the same
-weights, bit for bit, as one that never stopped (on the same machine, with the same number of threads and processes).
+weights, bit for bit, as one that never stopped (on the same CPU, with the same number of threads and processes).
+
+Several processes share each batch: process r of n takes items r, r + n, … of it. Gradients are averaged over processes,
+each loss weighted by its share of the batch, so that the step is that of the whole batch, also where shares differ.
 """
 
 import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -23,6 +26,12 @@ from tqdm import tqdm
 from .checkpoints import Checkpoint, read_checkpoint, write_checkpoint
 
 EPSILON = 1e-6  # of Adam, as in the ShapeAssembly authors' program
+CHECKPOINT, LOG = "checkpoint.safetensors", "log.jsonl"  # what a run keeps in its folder
+SHOW_EVERY = 10  # batches
+
+
+class TrainingError(RuntimeError):
+    """A training that cannot begin or go on; the message says why, and what to try."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +45,8 @@ class Schedule:
     last     the rate at the end, as a share of the highest, reached along half a cosine; 1 keeps it constant
     clip     largest norm of the gradient; a longer one is shortened to it
     seed     of everything random
+
+    Raises TrainingError for numbers that make no sense.
     """
 
     epochs: int
@@ -46,6 +57,17 @@ class Schedule:
     clip: float = math.inf
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        for name, least in {"epochs": 1, "batch": 1, "seed": 0}.items():
+            if (value := getattr(self, name)) < least:
+                raise TrainingError(f"{name} is {value}; expected at least {least}")
+        for name, most in {"rate": math.inf, "clip": math.inf}.items():
+            if not 0 < (value := getattr(self, name)) <= most:
+                raise TrainingError(f"{name} is {value}; expected a number above 0")
+        for name in ("warmup", "last"):
+            if not 0 <= (value := getattr(self, name)) <= 1:
+                raise TrainingError(f"{name} is {value}; expected a share from 0 to 1")
+
     def rate_at(self, progress: float) -> float:
         """The learning rate when a share `progress` of all steps is done."""
         if progress < self.warmup:
@@ -54,6 +76,7 @@ class Schedule:
         return self.rate * (self.last + (1 - self.last) * (1 + math.cos(math.pi * done)) / 2)
 
 
+@runtime_checkable
 class Task(Protocol):
     """What is learnt."""
 
@@ -72,28 +95,45 @@ class Task(Protocol):
         """Figures for the log at the end of an epoch, such as the loss on other data."""
 
 
-def fit(task: Task, schedule: Schedule, folder: Path, fabric: Fabric | None = None) -> list[dict]:
+def fit(
+    task: Task,
+    schedule: Schedule,
+    folder: Path,
+    fabric: Fabric | None = None,
+    told: Callable[[dict], None] | None = None,
+) -> list[dict]:
     """Train `task.network`; returns the log, one dict an epoch. Goes on from the checkpoint in `folder`, if any.
 
-    Raises CheckpointError for a checkpoint that is damaged or of another run.
+    fabric  where it runs, launched; if not given, one device: the GPU where there is one
+    told    called with the log's line after each epoch, in the first process
+    Raises CheckpointError for a checkpoint that is damaged or of another run; TrainingError where there is nothing to
+    learn from, or the loss stops being finite (the checkpoint is then that of the epoch before).
     """
-    fabric = fabric or Fabric()
-    fabric.launch()
+    if not len(task):
+        raise TrainingError("there is nothing to learn from: no training items")
+    fabric = fabric or Fabric(devices=1)
     # Plain Adam: the fused one gives other last bits on other processors.
     adam = torch.optim.Adam(task.network.parameters(), lr=schedule.rate, eps=EPSILON)
     network, optimizer = fabric.setup(task.network, adam)
     about = json.loads(json.dumps(task.about | asdict(schedule), default=str))
-    path = folder / "checkpoint.safetensors"
     log: list[dict] = []
-    if path.exists():
-        log = read_checkpoint(path, task.network, adam, about).log
+    if (folder / CHECKPOINT).exists():
+        log = read_checkpoint(folder / CHECKPOINT, task.network, adam, about).log
+    fabric.barrier()  # nobody writes before all have read
+    if fabric.is_global_zero:
+        for part in folder.glob("half-*.part"):  # a run was killed while it wrote; the folder is one run's
+            part.unlink(missing_ok=True)
     run = _Run(task, schedule, fabric, network, optimizer)
     for epoch in range(len(log), schedule.epochs):
         log = [*log, run.epoch(epoch, log[-1] if log else {})]
         if fabric.is_global_zero:
-            write_checkpoint(path, task.network, adam, Checkpoint(about, log))
-            _write_log(folder / "log.jsonl", log)
+            write_checkpoint(folder / CHECKPOINT, task.network, adam, Checkpoint(about, log))
+            _write_log(folder / LOG, log)
+            if told:
+                told(log[-1])
         fabric.barrier()
+    if fabric.is_global_zero:
+        _write_log(folder / LOG, log)  # again: a run may have been killed between checkpoint and log
     return log
 
 
@@ -117,15 +157,16 @@ class _Run:
         self.network.train()
         picks = batches(len(self.task), self.schedule, epoch)
         shown = f"epoch {epoch + 1}/{self.schedule.epochs}"
-        bar = tqdm(picks, desc=shown, disable=None if self.fabric.is_global_zero else True, leave=False)
+        hidden = None if self.fabric.is_global_zero else True  # None: where no terminal shows it
+        bar = tqdm(picks, desc=shown, disable=hidden, leave=False, dynamic_ncols=True)
         sums: dict[str, Tensor] = {}
         for number, batch in enumerate(bar):
             progress = (epoch + number / len(picks)) / self.schedule.epochs
             terms = self.step(batch, [self.schedule.seed, epoch, number], progress)
             for name, value in terms.items():
                 sums[name] = sums.get(name, 0) + value.detach()
-            if number % 10 == 0:
-                bar.set_postfix(loss=f"{sums['loss'].item() / (number + 1):.2f}")
+            if not bar.disable and number % SHOW_EVERY == 0:
+                bar.set_postfix({name: f"{value.item() / (number + 1):.3g}" for name, value in sums.items()})
         means = {name: self.fabric.all_reduce(value).item() / len(picks) for name, value in sums.items()}
         self.network.eval()
         seconds = before.get("seconds", 0.0) + time.perf_counter() - start
@@ -133,20 +174,28 @@ class _Run:
         return {"epoch": epoch + 1, **_rounded(found), "seconds": round(seconds, 1)}
 
     def step(self, batch: np.ndarray, seed: list[int], progress: float) -> dict[str, Tensor]:
-        """One update of the weights; each process takes its share of the batch."""
+        """One update of the weights; each process takes its share of the batch. The terms are weighted by the share."""
         for group in self.optimizer.param_groups:
             group["lr"] = self.schedule.rate_at(progress)
         rank, world = self.fabric.global_rank, self.fabric.world_size
         entropy = np.random.SeedSequence([*seed, rank]).generate_state(1)[0]
         noise = torch.Generator().manual_seed(int(entropy))
         own = batch[rank::world]
+        weight = len(own) * world / len(batch)  # 0 for a process that is left without an item; 1 if alone
         loss, terms = self.task.loss(self.network, own if len(own) else batch[:1], noise, progress)
         self.optimizer.zero_grad()
-        self.fabric.backward(loss)
-        if math.isfinite(self.schedule.clip):
-            self.fabric.clip_gradients(self.network, self.optimizer, max_norm=self.schedule.clip)
+        self.fabric.backward(loss * weight)
+        norm = self.fabric.clip_gradients(
+            self.network, self.optimizer, max_norm=self.schedule.clip, error_if_nonfinite=False
+        )
+        if not math.isfinite(loss.item() + norm.item()):
+            _seed, epoch, number = seed
+            raise TrainingError(
+                f"epoch {epoch + 1}, batch {number + 1}: loss {loss.item():.4g}, norm of its gradient "
+                f"{norm.item():.4g}; expected finite numbers: try a lower rate, or a smaller clip"
+            )
         self.optimizer.step()
-        return {"loss": loss, **terms}
+        return {name: value * weight for name, value in {"loss": loss, **terms}.items()}
 
 
 def _rounded(figures: dict[str, float]) -> dict[str, float]:
@@ -154,4 +203,6 @@ def _rounded(figures: dict[str, float]) -> dict[str, float]:
 
 
 def _write_log(path: Path, log: list[dict]) -> None:
-    path.write_text("".join(json.dumps(row) + "\n" for row in log), encoding="utf-8")
+    part = path.with_name(path.name + ".part")
+    part.write_text("".join(json.dumps(row) + "\n" for row in log), encoding="utf-8")
+    part.replace(path)

@@ -1,22 +1,13 @@
-"""Training the program VAE: its task, and a command.
+"""What the program VAE learns: to write the programs that it reads. The command is in `program_vae_command`."""
 
-    python -m lib.training.program_vae chair --epochs 120 --out runs/chair
-
-The paper trains one program at a time with a rate of 0.0001 (`--batch 1 --rate 1e-4 --constant`). The defaults here are
-batches with a higher rate that falls along half a cosine: the same model in a fraction of the time.
-"""
-
-import argparse
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
 from ..models.program_table import Level, ProgramTable, batch_of
 from ..models.program_vae import ProgramVAE
-from .loop import Schedule, fit
 from .program_loss import LossWeights, program_loss, total_loss
 
 PER_REPORT = 256  # programs at once when other data is scored
@@ -37,9 +28,10 @@ class ReadAndWrite(nn.Module):
 
 @dataclass
 class ProgramTask:
-    """Learn the programs of `train`; `other` is scored after every epoch.
+    """Learn the programs of `train`; `other` is scored after every epoch. A `Task` for `lib.training.loop.fit`.
 
     annealing  share of all steps in which the weight of the KL term grows from 0 to its full size
+    about      JSON: data and settings that must be the same when a run goes on
     """
 
     module: ReadAndWrite
@@ -59,6 +51,7 @@ class ProgramTask:
     def loss(
         self, network: nn.Module, picks: Sequence[int], noise: torch.Generator, progress: float
     ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Weighted loss of some programs and its unweighted terms, means over these programs."""
         device = next(network.parameters()).device
         levels = [level.to(device) for level in batch_of(self.train, picks)]
         hidden = self.module.network.config.hidden

@@ -1,0 +1,14 @@
+"""Train a network:   python -m lib.training NAME [options]       (python -m lib.training NAME --help lists them)
+
+On several processes or GPUs:   fabric run --devices 2 lib/training/__main__.py NAME [options]
+"""
+
+import sys
+
+from lib.training import program_vae_command  # absolute: `fabric run` starts this file as a script
+from lib.training.commands import main
+
+COMMANDS = {"program_vae": program_vae_command.COMMAND}
+
+if __name__ == "__main__":
+    sys.exit(main(COMMANDS))

@@ -1,0 +1,173 @@
+"""What the training commands share: settings, devices, how they end, and the facts kept beside the weights.
+
+OUT/checkpoint.safetensors   the run after its last whole epoch: the same command goes on from it
+OUT/log.jsonl                one line an epoch
+OUT/NAME.safetensors         at the end: the weights, for lib.models.weights.load
+OUT/NAME.json                and how they came to be
+"""
+
+import argparse
+import datetime
+import importlib.metadata
+import json
+import math
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from lightning_fabric import Fabric
+from torch import nn
+
+from ..datasets import REPOSITORY, DataError
+from ..interpreters.shapeassembly import ProgramError
+from ..models.weights import CheckpointError, save
+from .loop import CHECKPOINT, Schedule, Task, TrainingError, fit
+
+PROGRAM = "python -m lib.training"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A number of a training: its value here, and that of the paper (`--paper`)."""
+
+    name: str
+    kind: type
+    ours: int | float
+    papers: int | float
+    about: str
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a command line asks for. network: what is saved in the end; data: one sentence about it."""
+
+    task: Task
+    schedule: Schedule
+    network: nn.Module
+    data: str
+
+
+@dataclass(frozen=True)
+class Command:
+    """A network that can be trained: its own options, its settings, and how options become a job and a folder."""
+
+    about: str
+    settings: Sequence[Setting]
+    add_options: Callable[[argparse.ArgumentParser], None]
+    job: Callable[[argparse.Namespace], Job]
+    folder: Callable[[argparse.Namespace], Path]
+
+
+def main(commands: Mapping[str, Command], arguments: Sequence[str] | None = None) -> int:
+    """Train what the command line says; returns 0, 1 for a problem that is told on stderr, 130 after Ctrl-C."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser(commands).parse_args(arguments)
+    command = commands[options.name]
+    for setting in command.settings:
+        if getattr(options, setting.name) is None:
+            setattr(options, setting.name, setting.papers if options.paper else setting.ours)
+    folder = options.out or command.folder(options)
+    try:
+        _train(command, options, folder, f"{PROGRAM} {shlex.join(arguments)}")
+    except (DataError, CheckpointError, TrainingError, ProgramError) as error:
+        return _said(f"{type(error).__name__}: {error}", 1)
+    except OSError as error:
+        return _said(f"TrainingError: a file cannot be read or written: {error}", 1)
+    except KeyboardInterrupt:
+        kept = (folder / CHECKPOINT).exists()
+        goes_on = f"{folder} holds what is finished, and the same command goes on from there"
+        return _said(f"stopped; {goes_on if kept else 'no epoch was finished'}", 130)
+    return 0
+
+
+def fabric_of_this_run() -> Fabric:
+    """One device, the GPU where there is one; or what `fabric run` was told, which it passes on in the environment."""
+    if "LT_CLI_USED" not in os.environ:
+        return Fabric(devices=1)
+    if int(os.environ.get("WORLD_SIZE", "1")) > 1 and "LT_STRATEGY" not in os.environ:
+        # Not every batch uses all weights (flat programs fill no cuboid), and DDP would wait for their gradients.
+        return Fabric(strategy="ddp_find_unused_parameters_true")
+    return Fabric()
+
+
+def _parser(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=PROGRAM, description="Train a network.")
+    names = parser.add_subparsers(dest="name", required=True, metavar="NAME")
+    for name, command in commands.items():
+        one = names.add_parser(name, help=command.about, description=command.about)
+        command.add_options(one)
+        for each in command.settings:
+            told = f"{each.about} (default {each.ours:g}; with --paper {each.papers:g})"
+            one.add_argument(f"--{each.name}", type=each.kind, metavar="N", help=told)
+        one.add_argument("--paper", action="store_true", help="the paper's settings, where none is given")
+        one.add_argument("--seed", type=int, default=0, help="of everything random (default 0)")
+        one.add_argument("--out", type=Path, help="folder of the run (default: below runs/)")
+        one.add_argument("--threads", type=int, default=1, help="CPU threads a process (default 1)")
+    return parser
+
+
+def _train(command: Command, options: argparse.Namespace, folder: Path, line: str) -> None:
+    if options.threads < 1:
+        raise TrainingError(f"threads is {options.threads}; expected at least 1")
+    torch.set_num_threads(options.threads)
+    fabric = fabric_of_this_run()
+    job = command.job(options)
+
+    def told(row: dict) -> None:
+        figures = ", ".join(f"{name} {row[name]:.4g}" for name in ("loss", "val_loss") if name in row)
+        print(f"epoch {row['epoch']}/{job.schedule.epochs}: {figures}, {row['seconds']:.0f} s", flush=True)
+
+    if fabric.is_global_zero:
+        print(job.data, flush=True)
+    log = fit(job.task, job.schedule, folder, fabric, told)
+    if fabric.is_global_zero:
+        path = folder / f"{options.name}.safetensors"
+        save(job.network, path)
+        facts = _facts(job, log, fabric, line)
+        path.with_suffix(".json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+        print(f"weights: {path}; how they came to be: {path.with_suffix('.json')}")
+
+
+def _facts(job: Job, log: list[dict], fabric: Fabric, line: str) -> dict:
+    """What somebody needs to judge the weights, or to make them again."""
+    settings = job.task.about | vars(job.schedule)
+    return {
+        "network": type(job.network).__name__,
+        "weights": sum(weight.numel() for weight in job.network.parameters()),
+        "data": job.data,
+        "command": line,
+        # JSON has no infinity: null is no limit.
+        "settings": {name: None if value == math.inf else value for name, value in settings.items()},
+        "seed": job.schedule.seed,
+        "epochs": len(log),
+        "seconds": log[-1]["seconds"],
+        "losses": {name: value for name, value in log[-1].items() if name not in ("epoch", "seconds")},
+        "machine": {
+            "device": torch.cuda.get_device_name() if fabric.device.type == "cuda" else fabric.device.type,
+            "processes": fabric.world_size,
+            "threads": torch.get_num_threads(),
+            "torch": torch.__version__,
+        },
+        "code": {"version": importlib.metadata.version("shape-programs"), "commit": _commit()},
+        "date": datetime.date.today().isoformat(),
+    }
+
+
+def _commit() -> str:
+    """The commit of the code, marked if files differ from it."""
+    git = ["git", "-C", str(REPOSITORY), "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        found = subprocess.run(git, capture_output=True, text=True).stdout.strip()
+    except OSError:  # no git here
+        found = ""
+    return found or "unknown"
+
+
+def _said(line: str, code: int) -> int:
+    print(line, file=sys.stderr)
+    return code

@@ -6,13 +6,16 @@ Blocks are written level by level, all blocks of a level side by side, one line 
 
 A line whose cuboids leave their bounding box is not valid. What happens then is the *mode*:
 
-    reject  the whole program is given up (sampling)
+    reject  the whole program is given up (sampling); so are programs with a block of more than 100 lines
     skip    the line is left out, and the line before it read once more (reconstruction, interpolation)
     none    no rule is enforced, nothing is run: what the network says, which need not be a program
 
-Choices are the most likely ones; all chance lies in the latent code.
+Choices are the most likely ones; all chance lies in the latent code. A cuboid is filled by a block of its own where
+the network says so, the bbox never; cuboids that stand on nothing in the end are left out, a block without cuboids is
+none, and a program has at most 11 blocks, the outer ones first.
 """
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -23,9 +26,10 @@ from torch import Tensor
 from ..interpreters.shapeassembly import Program, ProgramError, execute_many
 from .program_table import ProgramTable, batch_of
 from .program_vae import ProgramVAE
-from .writing_level import SMALLEST, LevelWriter
+from .writing_level import LevelWriter
+from .writing_line import SMALLEST
 from .writing_rules import Rules
-from .written_blocks import Node, blocks_of
+from .written_blocks import NAMES, Node, blocks_of
 
 MODES = ("reject", "skip", "none")
 MAX_BLOCKS = 11  # of a program
@@ -55,11 +59,15 @@ def write(
 ) -> Written:
     """Programs of latent codes. Every program returned is checked, executes, and stands on its bounding box.
 
-    Raises ValueError for an unknown mode.
+    All work is done on the CPU, where the interpreter is the judge of every line; the network may be elsewhere.
+    Raises ValueError for an unknown mode, and for codes that are not (programs, hidden).
     """
     if mode not in MODES:
         raise ValueError(f"unknown mode {mode!r}: choose one of {', '.join(MODES)}")
-    return _Writer(network, mode, rules or Rules()).write(latent)
+    if latent.ndim != 2 or latent.shape[1] != network.config.hidden:
+        expected = f"(programs, {network.config.hidden})"
+        raise ValueError(f"latent codes of shape {tuple(latent.shape)}; expected {expected}")
+    return _Writer(_on_cpu(network), mode, rules or Rules()).write(latent.detach().float().cpu())
 
 
 @dataclass(frozen=True)
@@ -72,7 +80,7 @@ class Sampled:
     @property
     def rejection_rate(self) -> float:
         """Share of the codes that were rejected."""
-        return self.rejected / (self.rejected + len(self.programs))
+        return self.rejected / max(1, self.rejected + len(self.programs))
 
 
 def sample(
@@ -89,15 +97,18 @@ def sample(
     The first programs are the same for every `count`. Raises RuntimeError where hardly any code gives a program.
     """
     noise = torch.Generator().manual_seed(seed)
-    device = network.first_state.device
+    network = _on_cpu(network)
     programs: list[Program] = []
     rejected = 0
     while len(programs) < count:
         codes = spread * torch.randn(CODES_AT_ONCE, network.config.hidden, generator=noise)
-        for program in write(network, codes.to(device), mode, rules).programs:
-            if len(programs) < count:
-                programs.append(program) if program is not None else None
-                rejected += program is None
+        for program in write(network, codes, mode, rules).programs:
+            if len(programs) == count:
+                break
+            if program is None:
+                rejected += 1
+            else:
+                programs.append(program)
         if rejected > MOST_REJECTED * (len(programs) + 1):
             raise RuntimeError(
                 f"{rejected} codes rejected, {len(programs)} programs found; expected a trained network"
@@ -107,10 +118,15 @@ def sample(
 
 def reconstruct(network: ProgramVAE, programs: Sequence[Program], rules: Rules | None = None) -> Written:
     """Programs through the encoder and back; lines that break a rule are left out."""
-    table = ProgramTable.of(programs)
+    network, table = _on_cpu(network), ProgramTable.of(programs)
     with torch.no_grad():
         latent = network.encode(batch_of(table, range(len(table)))).mean
     return write(network, latent, "skip", rules)
+
+
+def _on_cpu(network: ProgramVAE) -> ProgramVAE:
+    """The network itself where it is there already, else a copy."""
+    return network if network.first_state.device.type == "cpu" else copy.deepcopy(network).cpu()
 
 
 @dataclass
@@ -122,35 +138,34 @@ class _Writer:
     count: list[int] = field(default_factory=list)  # blocks of each program
 
     def write(self, latent: Tensor) -> Written:
-        self.reasons, self.count = [""] * len(latent), [1] * len(latent)
-        roots = [Node(program) for program in range(len(latent))]
-        nodes, codes = roots, latent
         sizes = self.network.root_size(latent).clamp(min=SMALLEST)
-        depth = 0
+        finite = (latent.isfinite() & sizes.isfinite().all(-1, keepdim=True)).all(-1)
+        self.reasons = ["" if good else "its bounding box is not finite" for good in finite.tolist()]
+        self.count = [1] * len(latent)
+        roots = [Node(program) for program in range(len(latent))]
+        nodes, codes, depth = roots, latent, 0
         while nodes:
-            level = (nodes, codes, sizes, depth, self.mode, self.rules, self.reasons)
-            LevelWriter(self.network, *level).run()
-            nodes, codes, sizes = self._children(nodes)
+            LevelWriter(self.network, nodes, codes, sizes, depth, self.mode, self.rules, self.reasons).run()
+            nodes, fillings = self._children(nodes)
+            codes, sizes = (torch.stack(parts) for parts in zip(*fillings)) if nodes else (None, None)
             depth += 1
         programs = [self._program(root) for root in roots]
         self._execute(programs)
         return Written(programs, self.reasons)
 
-    def _children(self, nodes: list[Node]) -> tuple[list[Node], Tensor | None, Tensor | None]:
-        children, codes, sizes = [], [], []
+    def _children(self, nodes: list[Node]) -> tuple[list[Node], list[tuple[Tensor, Tensor]]]:
+        """The blocks of the next level, and the code and the bounding box of each."""
+        children, fillings = [], []
         for node in nodes:
-            for cuboid, code in node.codes.items():
+            standing = {NAMES.index(name) for name in node.standing()}
+            for cuboid in sorted(standing & node.fillings.keys()):
                 if self.reasons[node.program] or self.count[node.program] >= MAX_BLOCKS:
                     continue
                 self.count[node.program] += 1
-                child = Node(node.program)
-                node.children[cuboid] = child
-                children.append(child)
-                codes.append(code)
-                sizes.append(node.sizes[cuboid])
-        if not children:
-            return [], None, None
-        return children, torch.stack(codes), torch.stack(sizes)
+                node.children[cuboid] = Node(node.program)
+                children.append(node.children[cuboid])
+                fillings.append(node.fillings[cuboid])
+        return children, fillings
 
     def _program(self, root: Node) -> Program | None:
         """The program of a tree of blocks; notes the reason where there is none."""

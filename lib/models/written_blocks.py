@@ -1,10 +1,11 @@
 """Blocks while a network writes them, and the program that they are in the end."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from torch import Tensor
 
-from ..interpreters.shapeassembly import Attach, Block, Cuboid, Squeeze
+from ..interpreters.shapeassembly import Attach, Block, Cuboid, ProgramError, Reflect, Squeeze, Translate
 from ..interpreters.shapeassembly.program import BBOX, Statement
 from .program_lines import MAX_CUBOIDS
 from .program_table import ROOT
@@ -19,26 +20,32 @@ class Node:
 
     program     which program of the batch it belongs to
     statements  without start and end, the bbox line first
-    codes       cuboid -> code of the block that is to fill it
-    sizes       cuboid -> (3,) its written size, for the same cuboids
+    fillings    cuboid -> code (hidden,) of the block that is to fill it, and its size (3,) as written
     children    cuboid -> the block that fills it
     """
 
     program: int
     statements: list[Statement] = field(default_factory=list)
-    codes: dict[int, Tensor] = field(default_factory=dict)
-    sizes: dict[int, Tensor] = field(default_factory=dict)
+    fillings: dict[int, tuple[Tensor, Tensor]] = field(default_factory=dict)
     children: dict[int, "Node"] = field(default_factory=dict)
+
+    def standing(self) -> list[str]:
+        """Cuboids that an attach or squeeze connects to the bbox, as they were declared."""
+        moved = {s.moved for s in self.statements if isinstance(s, Attach | Squeeze)} - {BBOX}
+        return [s.name for s in self.statements if isinstance(s, Cuboid) and s.name in moved]
 
 
 def blocks_of(root: Node) -> tuple[Block, ...]:
-    """All blocks of a program, breadth-first; cuboids that stand on nothing are left out, with what is in them."""
+    """All blocks of a program, breadth-first; cuboids that stand on nothing are left out, with what is in them.
+
+    Raises ProgramError where one of these is used all the same; within the rules none is.
+    """
     blocks, waiting = [], [(root, ROOT)]
     for node, name in waiting:  # grows while it is walked
         names = {BBOX: BBOX}
-        for old in _grounded(node):
+        for old in node.standing():
             child = node.children.get(NAMES.index(old))
-            filled = child is not None and bool(_grounded(child))
+            filled = child is not None and bool(child.standing())
             names[old] = f"Program_{len(waiting)}" if filled else f"cube{len(names) - 1}"
             if filled:
                 waiting.append((child, names[old]))
@@ -46,17 +53,39 @@ def blocks_of(root: Node) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _grounded(node: Node) -> list[str]:
-    """Cuboids that an attach or squeeze connects to the bbox, as they were declared."""
-    moved = {s.moved for s in node.statements if isinstance(s, Attach | Squeeze)}
-    return [s.name for s in node.statements if isinstance(s, Cuboid) and s.name in moved]
+def leading_to(statements: Sequence[Statement], last: Statement) -> list[Statement]:
+    """What decides where the cuboids of `last` come to stand, then `last`; a cuboid that it moves is declared first.
+
+    An attach changes what it moves and nothing else, and asks how its partner stands at that moment; copies ask how
+    it stands in the end.
+    """
+    if isinstance(last, Reflect | Translate):
+        return [s for s in statements if not isinstance(s, Reflect | Translate)] + [last]
+    wanted, attaches = _partners(last) | {BBOX}, [last]
+    for statement in reversed(statements):
+        if not isinstance(statement, Cuboid) and statement.moved in wanted | {last.moved}:
+            attaches.append(statement)
+            wanted |= _partners(statement)
+    declared = {s.name: s for s in statements if isinstance(s, Cuboid)}
+    names = dict.fromkeys((BBOX, last.moved, *(name for name in declared if name in wanted)))
+    return [declared[name] for name in names] + attaches[::-1]
+
+
+def _partners(statement: Attach | Squeeze) -> set[str]:
+    return {statement.still} if isinstance(statement, Attach) else {statement.first, statement.second}
 
 
 def _stays(statement: Statement, names: dict[str, str]) -> bool:
-    """All but the declarations of cuboids that stand on nothing: nothing else can name these."""
+    """All but the declarations of cuboids that stand on nothing."""
     return not isinstance(statement, Cuboid) or statement.name in names
 
 
 def _renamed(statement: Statement, names: dict[str, str]) -> Statement:
     roles = [role for role in _ROLES if hasattr(statement, role)]
+    for role in roles:
+        if (name := getattr(statement, role)) not in names:
+            expected = "a cuboid that is connected to the bounding box"
+            raise ProgramError(
+                f"{statement.command} names {name}, which stands on nothing", expected=expected
+            )
     return replace(statement, **{role: names[getattr(statement, role)] for role in roles})

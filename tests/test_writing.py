@@ -25,7 +25,7 @@ from lib.models.program_vae import LineDecoder, ProgramVAE, ProgramVAEConfig
 from lib.models.weights import load
 from lib.models.writing import MAX_BLOCKS, MODES, reconstruct, sample, write
 from lib.models.writing_rules import AUTHORS, Rules
-from lib.models.written_blocks import Node, blocks_of, leading_to
+from lib.models.written_blocks import Node, blocks_of
 from tests.conftest import unchecked
 
 SMALL = ProgramVAEConfig(hidden=16, head=16)
@@ -337,27 +337,19 @@ def test_what_stands_on_nothing_cannot_be_used():
 
 
 @pytest.mark.usefixtures("unchecked_shapes")
-def test_a_few_lines_decide_where_a_cuboid_stands(sampled):
-    """The same box as after all lines before: for every line of random programs, in which anything may move again."""
-    whole, part, moved = [], [], []
-    for block in [block for program in sampled for block in program.blocks]:
-        for stop, last in enumerate(block.statements):
-            if isinstance(last, Cuboid):
-                continue
-            before = block.statements[:stop]
-            few = leading_to(before, last)
-            assert len(few) <= stop + 1 and few[-1] == last
-            whole.append(Program.unchecked((Block("b", (*before, last)),)))
-            part.append(Program.unchecked((Block("b", tuple(few)),)))
-            moved.append(last)
-    assert sum(len(p.blocks[0].statements) for p in part) < sum(len(w.blocks[0].statements) for w in whole)
-    for one, other, last in zip(execute_many(whole), execute_many(part), moved):
-        if isinstance(last, Attach | Squeeze):
-            expected = one.cuboids[one.names.index(f"b/{last.moved}")]
-            assert torch.equal(other.cuboids[0].corners(), expected.corners())
-        else:  # the copies come last
-            copies = getattr(last, "count", 1)
-            assert torch.equal(other.cuboids.corners()[-copies:], one.cuboids.corners()[-copies:])
+def test_drawn_choices_keep_the_rules_and_follow_their_seed():
+    torch.manual_seed(3)
+    quiet = ProgramVAE(SMALL)
+    latent = codes(64, quiet, 1)
+    likely, again = (write(quiet, latent, "skip").programs for _ in range(2))
+    drawn, same, other = (
+        write(quiet, latent, "skip", temperature=1.0, seed=seed).programs for seed in (0, 0, 1)
+    )
+    assert likely == again and drawn == same
+    assert drawn != other and drawn != likely
+    check([program for program in drawn + other if program], Rules(), every=20)
+    with pytest.raises(ValueError, match="a temperature of -1"):
+        write(quiet, latent, temperature=-1)
 
 
 def test_rules_are_a_value():

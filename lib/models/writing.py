@@ -10,12 +10,13 @@ A line whose cuboids leave their bounding box is not valid. What happens then is
     skip    the line is left out, and the line before it read once more (reconstruction, interpolation)
     none    no rule is enforced, nothing is run: what the network says, which need not be a program
 
-Choices are the most likely ones; all chance lies in the latent code. A cuboid is filled by a block of its own where
-the network says so, the bbox never; cuboids that stand on nothing in the end are left out, a block without cuboids is
-none, and a program has at most 11 blocks, the outer ones first.
+Choices are the most likely ones, so that all chance lies in the latent code, or are drawn at a temperature. A cuboid is
+filled by a block of its own where the network says so, the bbox never; cuboids that stand on nothing in the end are
+left out, a block without cuboids is none, and a program has at most 11 blocks, the outer ones first.
 """
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -27,7 +28,7 @@ from ..interpreters.shapeassembly import Program, ProgramError, execute_many
 from .program_table import ProgramTable, batch_of
 from .program_vae import ProgramVAE
 from .writing_level import LevelWriter
-from .writing_line import SMALLEST
+from .writing_line import SMALLEST, LineWriter
 from .writing_rules import Rules
 from .written_blocks import NAMES, Node, blocks_of
 
@@ -56,18 +57,28 @@ def write(
     latent: Float[Tensor, "programs latent"],
     mode: str = "reject",
     rules: Rules | None = None,
+    temperature: float = 0.0,
+    seed: int = 0,
 ) -> Written:
     """Programs of latent codes. Every program returned is checked, executes, and stands on its bounding box.
 
+    temperature  0: the most likely choice of command, cuboids, axis and face, as the authors do; up to 1: choices are
+                 drawn with the probabilities that the network gives them, from `seed`
+
     All work is done on the CPU, where the interpreter is the judge of every line; the network may be elsewhere.
-    Raises ValueError for an unknown mode, and for codes that are not (programs, hidden).
+    Raises ValueError for an unknown mode, for codes that are not (programs, hidden), and a temperature below 0.
     """
     if mode not in MODES:
         raise ValueError(f"unknown mode {mode!r}: choose one of {', '.join(MODES)}")
+    if not 0 <= temperature < math.inf:
+        raise ValueError(f"a temperature of {temperature}; expected 0 or more")
     if latent.ndim != 2 or latent.shape[1] != network.config.hidden:
         expected = f"(programs, {network.config.hidden})"
         raise ValueError(f"latent codes of shape {tuple(latent.shape)}; expected {expected}")
-    return _Writer(_on_cpu(network), mode, rules or Rules()).write(latent.detach().float().cpu())
+    network = _on_cpu(network)
+    noise = torch.Generator().manual_seed(seed)
+    line = LineWriter(network.line, rules or Rules(), mode == "none", temperature, noise)
+    return _Writer(network, mode, line).write(latent.detach().float().cpu())
 
 
 @dataclass(frozen=True)
@@ -90,10 +101,12 @@ def sample(
     mode: str = "reject",
     rules: Rules | None = None,
     spread: float = 1.0,
+    temperature: float = 0.0,
 ) -> Sampled:
     """`count` programs from random latent codes; codes that give none are replaced by further ones.
 
-    spread  standard deviation of the codes: below 1, shapes nearer to the usual ones
+    spread       standard deviation of the codes: below 1, shapes nearer to the usual ones
+    temperature  of the choices, see `write`; all chance comes from `seed`
     The first programs are the same for every `count`. Raises RuntimeError where hardly any code gives a program.
     """
     noise = torch.Generator().manual_seed(seed)
@@ -102,7 +115,8 @@ def sample(
     rejected = 0
     while len(programs) < count:
         codes = spread * torch.randn(CODES_AT_ONCE, network.config.hidden, generator=noise)
-        for program in write(network, codes, mode, rules).programs:
+        drawn = int(torch.randint(2**31, (), generator=noise))
+        for program in write(network, codes, mode, rules, temperature, drawn).programs:
             if len(programs) == count:
                 break
             if program is None:
@@ -133,7 +147,7 @@ def _on_cpu(network: ProgramVAE) -> ProgramVAE:
 class _Writer:
     network: ProgramVAE
     mode: str
-    rules: Rules
+    line: LineWriter
     reasons: list[str] = field(default_factory=list)
     count: list[int] = field(default_factory=list)  # blocks of each program
 
@@ -145,7 +159,8 @@ class _Writer:
         roots = [Node(program) for program in range(len(latent))]
         nodes, codes, depth = roots, latent, 0
         while nodes:
-            LevelWriter(self.network, nodes, codes, sizes, depth, self.mode, self.rules, self.reasons).run()
+            level = (nodes, codes, sizes, depth)
+            LevelWriter(self.network, *level, self.mode, self.line, self.reasons).run()
             nodes, fillings = self._children(nodes)
             codes, sizes = (torch.stack(parts) for parts in zip(*fillings)) if nodes else (None, None)
             depth += 1

@@ -17,8 +17,8 @@ from .program_lines import COMMAND, FIELD, WIDTH, statement_of
 from .program_table import ROOT
 from .program_vae import ProgramVAE
 from .writing_line import LineWriter
-from .writing_rules import BlockStates, Rules
-from .written_blocks import NAMES, Node, leading_to
+from .writing_rules import BlockStates
+from .written_blocks import NAMES, Node
 
 MAX_STEPS = 100  # lines of a block, those that are left out included
 MAX_SKIPS = 10  # in a row; then the bad line is read instead of the last good one
@@ -29,6 +29,7 @@ class LevelWriter:
 
     codes    (nodes, hidden) of the blocks;  sizes  (nodes, 3) their bounding boxes, world units;  depth  of the level
     mode     "reject", "skip" or "none", see `writing`
+    writer   decides each line
     reasons  why each program is given up, or ""; noted here
     """
 
@@ -40,15 +41,14 @@ class LevelWriter:
         sizes: Float[Tensor, "nodes 3"],
         depth: int,
         mode: str,
-        rules: Rules,
+        writer: LineWriter,
         reasons: list[str],
     ):
         self.network, self.nodes, self.depth = network, list(nodes), depth
         self.codes, self.sizes = codes, sizes
-        self.mode, self.rules, self.reasons = mode, rules, reasons
-        self.writer = LineWriter(network.line, rules, free=mode == "none")
+        self.mode, self.writer, self.reasons = mode, writer, reasons
         n = len(self.nodes)
-        self.states = BlockStates.new(n, rules.same_side)
+        self.states = BlockStates.new(n, writer.rules.same_side)
         self.hidden = codes.clone()
         self.line = codes.new_zeros(n, WIDTH)  # what each block reads next
         self.skips = torch.zeros(n, dtype=torch.long)
@@ -130,22 +130,26 @@ class LevelWriter:
         if not at:
             return within
         rows = self.rows[at]
-        tried = [leading_to(self.nodes[row].statements, statements[i]) for row, i in zip(rows.tolist(), at)]
-        shapes = execute_many([Program.unchecked((Block(ROOT, tuple(lines)),)) for lines in tried])
+        # All that was written so far: where an attach leads depends on every attach its cuboid took part in.
+        tried = [(*self.nodes[row].statements, statements[i]) for row, i in zip(rows.tolist(), at)]
+        shapes = execute_many([Program.unchecked((Block(ROOT, lines),)) for lines in tried])
         cuboids, count = shapes.cuboids, torch.tensor(shapes.count)
         owner = torch.arange(len(at)).repeat_interleave(count)
-        limit = (1 + self.rules.outside) / 2 * self.sizes[rows].to(cuboids.size)
+        limit = (1 + self.writer.rules.outside) / 2 * self.sizes[rows].to(cuboids.size)
         inside = (cuboids.corners().abs() < limit[owner, None]).flatten(1).all(1)  # not so for nan
         within[torch.tensor(at)[owner[~inside]]] = False
-        first = cuboids.center[count.cumsum(0) - count].to(self.states.center)
-        self._note_centers(rows, [statements[i] if within[i] else None for i in at], first)
+        valid = [statements[i] if within[i] else None for i in at]
+        self._note_centers(rows, valid, cuboids.center, (count.cumsum(0) - count).tolist())
         return within
 
-    def _note_centers(self, rows: Tensor, statements: list[Statement | None], first: Tensor) -> None:
-        """Where the cuboids that valid attaches moved are now: `leading_to` declares them first."""
-        for row, statement, center in zip(rows.tolist(), statements, first):
+    def _note_centers(
+        self, rows: Tensor, statements: list[Statement | None], center: Tensor, first: list[int]
+    ) -> None:
+        """Where the cuboids that valid attaches moved are now; `first` has the first cuboid of each block."""
+        for row, statement, start in zip(rows.tolist(), statements, first):
             if isinstance(statement, Attach | Squeeze):
-                self.states.center[row, NAMES.index(statement.moved)] = center
+                moved = NAMES.index(statement.moved)
+                self.states.center[row, moved] = center[start + moved - 1].to(self.states.center)
 
     def _skip(self, rows: Tensor, lines: Tensor) -> None:
         self.skips[rows] += 1

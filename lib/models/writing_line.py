@@ -50,18 +50,25 @@ class Choice:
 
 @dataclass(frozen=True)
 class LineWriter:
-    """heads: of the network; rules: their tolerances; free: enforce none of them."""
+    """heads: of the network; rules: their tolerances; free: enforce none of them.
+
+    temperature  0: the most likely choices. Above, choices are drawn, with probabilities that grow with
+                 exp(logit / temperature), by adding Gumbel noise of that scale to the logits
+    noise        what they are drawn from
+    """
 
     heads: LineDecoder
     rules: Rules
     free: bool = False
+    temperature: float = 0.0
+    noise: torch.Generator | None = None
 
     def write(
         self, state: Float[Tensor, "n hidden"], states: BlockStates, sizes: Float[Tensor, "n 3"]
     ) -> Float[Tensor, "n 63"]:
         """The next line of each block, given the GRU's state, the block so far, and its bounding box."""
         lines = state.new_zeros(len(state), WIDTH)
-        command = best(self.heads.command(state), self._allowed(states.commands()))[:, 0]
+        command = self._pick(self.heads.command(state), states.commands())[:, 0]
         lines[:, FIELD["command"]] = one_hot(command, len(COMMANDS)).to(lines)
         logits = self.heads.cuboids(state, lines[:, FIELD["command"]])
         for name, fill in _FILL.items():
@@ -80,7 +87,7 @@ class LineWriter:
 
     def _attach(self, choice: Choice) -> None:
         scores = choice.logits[:, 0, :, None] + choice.logits[:, 1, None, :]
-        pair = best(scores, self._allowed(choice.states.pairs()))
+        pair = self._pick(scores, choice.states.pairs())
         found = self.heads.attach(choice.state, choice.mark_cuboids(pair)).clamp(0, 1)
         if not self.free:
             found[:, 4] = torch.where(
@@ -97,23 +104,30 @@ class LineWriter:
     def _squeeze(self, choice: Choice) -> None:
         first, second, third = choice.logits.unbind(1)
         scores = first[:, :, None, None] + second[:, None, :, None] + third[:, None, None, :]
-        triple = best(scores, self._allowed(choice.states.triples()))
+        triple = self._pick(scores, choice.states.triples())
         face, uv = self.heads.squeeze(choice.state, choice.mark_cuboids(triple))
-        choice.mark("face", best(face, self._allowed(choice.states.faces(triple)))[:, 0])
+        choice.mark("face", self._pick(face, choice.states.faces(triple))[:, 0])
         choice.lines[:, FIELD["uv"]] = uv.clamp(0, 1)
 
     def _reflect(self, choice: Choice) -> None:
         allowed = self._allowed(choice.states.reflections())
-        source = best(choice.logits[:, 0], allowed.any(-1))
+        source = self._pick(choice.logits[:, 0], allowed.any(-1))
         axis, _, _ = self.heads.symmetry(choice.state, choice.mark_cuboids(source), choice.sizes)
-        choice.mark("axis", best(axis, allowed[torch.arange(len(source)), source[:, 0]])[:, 0])
+        choice.mark("axis", self._pick(axis, allowed[torch.arange(len(source)), source[:, 0]])[:, 0])
 
     def _translate(self, choice: Choice) -> None:
-        source = best(choice.logits[:, 0], self._allowed(choice.states.sources()))
+        source = self._pick(choice.logits[:, 0], choice.states.sources())
         axis, count, distance = self.heads.symmetry(choice.state, choice.mark_cuboids(source), choice.sizes)
         choice.mark("axis", axis.argmax(-1))
         choice.lines[:, FIELD["count"]] = count.round().clamp(1, self.rules.most)[:, None]
         choice.lines[:, FIELD["distance"]] = distance.clamp(0, 1)[:, None]
+
+    def _pick(self, logits: Tensor, allowed: Tensor) -> Tensor:
+        """The choice of each row, as indices."""
+        if self.temperature:
+            uniform = torch.rand(logits.shape, generator=self.noise).clamp(1e-9, 1 - 1e-7)
+            logits = logits - self.temperature * (-uniform.log()).log()
+        return best(logits, self._allowed(allowed))
 
     def _allowed(self, allowed: Bool[Tensor, "n *choices"]) -> Bool[Tensor, "n *choices"]:
         return torch.ones_like(allowed) if self.free else allowed

@@ -1,11 +1,10 @@
 """Blocks while a network writes them, and the program that they are in the end."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from torch import Tensor
 
-from ..interpreters.shapeassembly import Attach, Block, Cuboid, ProgramError, Reflect, Squeeze, Translate
+from ..interpreters.shapeassembly import Attach, Block, Cuboid, ProgramError, Squeeze
 from ..interpreters.shapeassembly.program import BBOX, Statement
 from .program_lines import MAX_CUBOIDS
 from .program_table import ROOT
@@ -51,28 +50,6 @@ def blocks_of(root: Node) -> tuple[Block, ...]:
                 waiting.append((child, names[old]))
         blocks.append(Block(name, tuple(_renamed(s, names) for s in node.statements if _stays(s, names))))
     return tuple(blocks)
-
-
-def leading_to(statements: Sequence[Statement], last: Statement) -> list[Statement]:
-    """What decides where the cuboids of `last` come to stand, then `last`; a cuboid that it moves is declared first.
-
-    An attach changes what it moves and nothing else, and asks how its partner stands at that moment; copies ask how
-    it stands in the end.
-    """
-    if isinstance(last, Reflect | Translate):
-        return [s for s in statements if not isinstance(s, Reflect | Translate)] + [last]
-    wanted, attaches = _partners(last) | {BBOX}, [last]
-    for statement in reversed(statements):
-        if not isinstance(statement, Cuboid) and statement.moved in wanted | {last.moved}:
-            attaches.append(statement)
-            wanted |= _partners(statement)
-    declared = {s.name: s for s in statements if isinstance(s, Cuboid)}
-    names = dict.fromkeys((BBOX, last.moved, *(name for name in declared if name in wanted)))
-    return [declared[name] for name in names] + attaches[::-1]
-
-
-def _partners(statement: Attach | Squeeze) -> set[str]:
-    return {statement.still} if isinstance(statement, Attach) else {statement.first, statement.second}
 
 
 def _stays(statement: Statement, names: dict[str, str]) -> bool:

@@ -52,6 +52,7 @@ WRITTEN = ("ours", "ours_authors_rules", "no_reject", *ABLATIONS)
 METHODS = (*WRITTEN, "ground_truth", "validation", "interpolation")
 CLOUD = 1_024  # points on a shape, for what PointNet sees
 QUICK = 48
+LEAST = 8  # samples: a classifier needs some to learn from, and some that it has not seen
 SEQUENCES, STEPS = 100, 100  # of Table 6
 
 
@@ -99,7 +100,10 @@ def written_row(category: str, method: str, network: ProgramVAE, samples: int, s
     mode = "skip" if method == "no_reject" else "reject"
     rules = AUTHORS if method == "ours_authors_rules" else Rules()
     start = time.perf_counter()
-    found = sample(network, samples, seed, mode, rules)
+    try:
+        found = sample(network, samples, seed, mode, rules)
+    except RuntimeError as error:  # it gave up
+        raise DataError(f"these weights write hardly any program: {error}") from error
     writing = time.perf_counter() - start
     shapes, train = execute_many(found.programs), execute_many(real)
     near = novelty(shapes, train, execute_many(list(shapeassembly(category, "val"))), seed)
@@ -119,14 +123,14 @@ def ground_truth_row(category: str, samples: int, seed: int) -> dict:
     every = list(shapeassembly(category))
     chosen = np.random.default_rng(seed).permutation(len(every))[:samples]
     row = physics(execute_many([every[i] for i in chosen]))
-    return {**row, **counts(every, execute_many(every))}
+    return {"samples": len(chosen), "programs": len(every), **row, **counts(every, execute_many(every))}
 
 
 def validation_row(category: str, samples: int, seed: int) -> dict:
     """Validation programs in the place of generated ones: Table 4, and how new their structures are."""
     real, other = list(shapeassembly(category, "train")), list(shapeassembly(category, "val"))[:samples]
     near = novelty(execute_many(other), execute_many(real), None, seed)
-    return {**vars(near), "novel_percent": 100 * novel_share(other, real)}
+    return {"samples": len(other), **vars(near), "novel_percent": 100 * novel_share(other, real)}
 
 
 def interpolation_row(network: ProgramVAE, samples: int, seed: int) -> dict:
@@ -137,8 +141,16 @@ def interpolation_row(network: ProgramVAE, samples: int, seed: int) -> dict:
         start, end = torch.randn(2, network.config.hidden, generator=noise)
         codes = torch.lerp(start, end, torch.linspace(0, 1, STEPS + 1)[:, None])
         sequences.append(write(network, codes, "skip").accepted)
-    step = step_size([sequence for sequence in sequences if len(sequence) > 1], seed)
-    return {"geometric_step": step.geometric, "program_step": step.program, "sequences": len(sequences)}
+    whole = [sequence for sequence in sequences if len(sequence) > 1]
+    if not whole:
+        raise DataError("these weights write hardly any program; expected a trained network")
+    step, steps = step_size(whole, seed), sum(map(len, whole)) - len(whole)
+    return {
+        "samples": len(whole),
+        "steps": steps,
+        "geometric_step": step.geometric,
+        "program_step": step.program,
+    }
 
 
 def measure(category: str, method: str, weights: Path, samples: int, seed: int) -> dict:
@@ -194,6 +206,8 @@ def main(arguments: list[str] | None = None) -> int:
         if options.method in ABLATIONS and not options.weights:
             raise DataError(f"--method {options.method} needs --weights: they are not committed")
         samples = QUICK if options.quick else options.samples
+        if samples < LEAST:
+            raise DataError(f"--samples is {samples}; expected at least {LEAST}")
         try:
             row = measure(options.category, options.method, weights, samples, options.seed)
         except CheckpointError as error:

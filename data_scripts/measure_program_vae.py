@@ -4,6 +4,7 @@
     python -m data_scripts.measure_program_vae chair --method no_reject       the same, invalid lines left out instead
     python -m data_scripts.measure_program_vae chair --method ours_authors_rules       their tolerances: 50 %, not 10 %
     python -m data_scripts.measure_program_vae chair --method ours_drawn      and choices drawn at temperature 1
+    python -m data_scripts.measure_program_vae chair --method ours_fitted     or codes drawn from where real ones lie
     python -m data_scripts.measure_program_vae chair --method flat --weights runs/chair-flat/program_vae.safetensors
     python -m data_scripts.measure_program_vae chair --method ground_truth    the real programs themselves
     python -m data_scripts.measure_program_vae chair --method validation      the row "Validation" of Table 4
@@ -40,6 +41,7 @@ from lib.metrics.realism import cloud_features, frechet_distance
 from lib.metrics.rootedness import rooted
 from lib.metrics.stability import AUTHORS_TRIAL, stable_many
 from lib.metrics.structures import novel_share
+from lib.models.code_distribution import CodeDistribution
 from lib.models.point_net import PointNet
 from lib.models.program_vae import ProgramVAE
 from lib.models.weights import CheckpointError, load
@@ -50,7 +52,11 @@ from lib.training.realism import percent_fooled
 FOLDER = REPOSITORY / "results" / "program_vae"
 PRETRAINED = REPOSITORY / "pretrained"
 ABLATIONS = ("flat", "no_order", "no_align", "no_macros")
-LOOSE = ("ours_authors_rules", "ours_drawn")  # methods with the tolerances of the authors' program
+LOOSE = (
+    "ours_authors_rules",
+    "ours_drawn",
+    "ours_fitted",
+)  # methods with the tolerances of the authors' program
 WRITTEN = ("ours", *LOOSE, "no_reject", *ABLATIONS)
 METHODS = (*WRITTEN, "ground_truth", "validation", "interpolation")
 CLOUD = 1_024  # points on a shape, for what PointNet sees
@@ -103,16 +109,23 @@ def written_row(category: str, method: str, network: ProgramVAE, samples: int, s
     mode = "skip" if method == "no_reject" else "reject"
     rules = AUTHORS if method in LOOSE else Rules()
     temperature = 1.0 if method == "ours_drawn" else 0.0
+    codes = CodeDistribution.of(network, real) if method == "ours_fitted" else None
     start = time.perf_counter()
     try:
-        found = sample(network, samples, seed, mode, rules, temperature=temperature)
+        found = sample(network, samples, seed, mode, rules, temperature=temperature, codes=codes)
     except RuntimeError as error:  # it gave up
         raise DataError(f"these weights write hardly any program: {error}") from error
     writing = time.perf_counter() - start
     shapes, train = execute_many(found.programs), execute_many(real)
     near = novelty(shapes, train, execute_many(list(shapeassembly(category, "val"))), seed)
     return {
-        "rules": {"mode": mode, "near": rules.near, "outside": rules.outside, "temperature": temperature},
+        "rules": {
+            "mode": mode,
+            "near": rules.near,
+            "outside": rules.outside,
+            "temperature": temperature,
+            "fitted_codes": codes is not None,
+        },
         "rejected_percent": 100 * found.rejection_rate,
         **quality(shapes, train, seed),
         **counts(found.programs, shapes),

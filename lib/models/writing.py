@@ -25,6 +25,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from ..interpreters.shapeassembly import Program, ProgramError, execute_many
+from .code_distribution import CodeDistribution
 from .program_table import ProgramTable, batch_of
 from .program_vae import ProgramVAE
 from .writing_level import LevelWriter
@@ -102,11 +103,13 @@ def sample(
     rules: Rules | None = None,
     spread: float = 1.0,
     temperature: float = 0.0,
+    codes: CodeDistribution | None = None,
 ) -> Sampled:
     """`count` programs from random latent codes; codes that give none are replaced by further ones.
 
     spread       standard deviation of the codes: below 1, shapes nearer to the usual ones
     temperature  of the choices, see `write`; all chance comes from `seed`
+    codes        what codes are drawn from; default: the standard normal distribution, as in the paper
     The first programs are the same for every `count`. Raises RuntimeError where hardly any code gives a program.
     """
     noise = torch.Generator().manual_seed(seed)
@@ -114,9 +117,10 @@ def sample(
     programs: list[Program] = []
     rejected = 0
     while len(programs) < count:
-        codes = spread * torch.randn(CODES_AT_ONCE, network.config.hidden, generator=noise)
+        latent = spread * torch.randn(CODES_AT_ONCE, network.config.hidden, generator=noise)
+        latent = latent if codes is None else codes.at(latent)
         drawn = int(torch.randint(2**31, (), generator=noise))
-        for program in write(network, codes, mode, rules, temperature, drawn).programs:
+        for program in write(network, latent, mode, rules, temperature, drawn).programs:
             if len(programs) == count:
                 break
             if program is None:

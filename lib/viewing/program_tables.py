@@ -42,7 +42,7 @@ class Layout:
     methods: Sequence[str]
 
 
-OURS = ("ours", "ours_authors_rules", "ours_drawn")  # one network, three ways to sample
+OURS = ("ours", "ours_authors_rules", "ours_drawn", "ours_fitted")  # one network, four ways to sample
 _TOLD = (*OURS, "ground_truth")
 TABLES = {
     2: Layout(
@@ -88,6 +88,7 @@ TABLES = {
 NAMES = METHODS | {
     "ours_authors_rules": "Ours, their rules",
     "ours_drawn": "… choices drawn",
+    "ours_fitted": "… codes fitted",
     "interpolation": "Interpolation",
 }
 CATEGORIES = tuple(PAPER)

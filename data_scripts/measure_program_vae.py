@@ -30,7 +30,7 @@ import torch
 
 from data_scripts.ending import exit_code
 from data_scripts.journal import code_digest, write_whole
-from data_scripts.measuring import INTERRUPTED, check_writable
+from data_scripts.measuring import INTERRUPTED, check_seed, check_writable
 from lib.datasets import CATEGORIES, REPOSITORY, DataError, shapeassembly
 from lib.interpreters.shapeassembly import Program, Shapes, execute_many
 from lib.metrics.chamfer import novelty
@@ -60,6 +60,7 @@ LOOSE = (
 WRITTEN = ("ours", *LOOSE, "no_reject", *ABLATIONS)
 METHODS = (*WRITTEN, "ground_truth", "validation", "interpolation")
 CLOUD = 1_024  # points on a shape, for what PointNet sees
+FITTED_SPREAD = 0.9  # of codes from a fitted distribution: somewhat nearer to its middle
 QUICK = 48
 LEAST = 8  # samples: a classifier needs some to learn from, and some that it has not seen
 SEQUENCES, STEPS = 100, 100  # of Table 6
@@ -109,10 +110,12 @@ def written_row(category: str, method: str, network: ProgramVAE, samples: int, s
     mode = "skip" if method == "no_reject" else "reject"
     rules = AUTHORS if method in LOOSE else Rules()
     temperature = 1.0 if method == "ours_drawn" else 0.0
-    codes = CodeDistribution.of(network, real) if method == "ours_fitted" else None
+    fitted = method == "ours_fitted"
+    codes = CodeDistribution.of(network, real) if fitted else None
+    spread = FITTED_SPREAD if fitted else 1.0
     start = time.perf_counter()
     try:
-        found = sample(network, samples, seed, mode, rules, temperature=temperature, codes=codes)
+        found = sample(network, samples, seed, mode, rules, spread, temperature, codes)
     except RuntimeError as error:  # it gave up
         raise DataError(f"these weights write hardly any program: {error}") from error
     writing = time.perf_counter() - start
@@ -225,6 +228,7 @@ def main(arguments: list[str] | None = None) -> int:
         samples = QUICK if options.quick else options.samples
         if samples < LEAST:
             raise DataError(f"--samples is {samples}; expected at least {LEAST}")
+        check_seed(options.seed)
         try:
             row = measure(options.category, options.method, weights, samples, options.seed)
         except CheckpointError as error:

@@ -13,6 +13,7 @@ from data_scripts.journal import write_whole
 from lib.datasets import REPOSITORY, DataError
 
 INTERRUPTED = "interrupted; nothing was written"
+LARGEST_SEED = 2**32 - 1  # multiples of it, one for each set of points, are still seeds that torch takes
 
 
 def command(
@@ -54,3 +55,9 @@ def check_writable(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     if not os.access(path.parent, os.W_OK) or path.exists() and not os.access(path, os.W_OK):
         raise DataError(f"{path} cannot be written; expected a file in a folder of yours")
+
+
+def check_seed(seed: int) -> None:
+    """Raises DataError for a seed that a generator would refuse, minutes later perhaps."""
+    if not 0 <= seed <= LARGEST_SEED:
+        raise DataError(f"--seed is {seed}; expected 0 to {LARGEST_SEED}")

@@ -16,8 +16,8 @@ from tqdm import tqdm
 
 from data_scripts.ending import exit_code
 from data_scripts.journal import write_whole
-from data_scripts.measuring import INTERRUPTED, check_writable
-from lib.datasets import CATEGORIES, REPOSITORY, shapeassembly
+from data_scripts.measuring import INTERRUPTED, check_seed, check_writable
+from lib.datasets import CATEGORIES, REPOSITORY, DataError, shapeassembly
 from lib.interpreters.shapeassembly import execute_many
 from lib.metrics.clouds import surface_points_many
 from lib.metrics.realism import in_parts
@@ -59,7 +59,14 @@ LICENCES = {
 
 def train(options: argparse.Namespace) -> None:
     """Train, measure on the val split, write weights and card."""
+    card_path = options.out.with_suffix(".md")
+    if card_path == options.out:
+        raise DataError(
+            f"{options.out} is where the card goes; expected another ending, such as .safetensors"
+        )
+    check_seed(options.seed)
     check_writable(options.out)
+    check_writable(card_path)
     torch.set_num_threads(1)
     started = time.process_time()
     edges = {category: _edges(category, options.shapes) for category in CATEGORIES}
@@ -74,7 +81,7 @@ def train(options: argparse.Namespace) -> None:
     facts |= {"train": len(points), "seconds": time.process_time() - started}
     card = _card(network, facts, schedule, options)
     save(network.eval(), options.out)
-    write_whole(options.out.with_suffix(".md"), card.encode())
+    write_whole(card_path, card.encode())
     print(card)
     print(f"kept in {options.out}")
 

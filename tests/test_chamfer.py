@@ -154,3 +154,8 @@ def test_real_validation_shapes_are_as_far_as_in_the_paper(real_texts, unchecked
     assert found == pytest.approx(
         PAPER["storage"]["validation"].variety, abs=0.002
     )  # found 0.1242 with other points
+
+
+def test_no_queries_are_told():
+    with pytest.raises(ValueError, match="found no queries"):
+        nearest_clouds(torch.zeros(0, 4, 3), torch.zeros(2, 4, 3))

@@ -56,6 +56,7 @@ def test_points_lie_on_the_box_and_as_many_on_a_face_as_its_area_says():
 
 def test_no_shapes_have_no_points():
     assert surface_points_many([], 5).shape == (0, 5, 3)
+    assert surface_points_many(execute_many([]), 5).shape == (0, 5, 3)
 
 
 def test_a_shape_without_a_surface_is_named():

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from lib import datasets
-from lib.models import exploring
+from lib.models import exploring, weights
 from lib.models.exploring import Directions, analogy, arc, codes, interpolate, mean_code, straight
 from lib.models.pretrained import pretrained
 from lib.models.program_vae import ProgramVAE, ProgramVAEConfig
@@ -154,3 +154,14 @@ def test_weights_that_are_not_there(tmp_path):
     with pytest.raises(CheckpointError, match="found none at all"):
         pretrained("chairs", tmp_path / "nowhere")
     assert pretrained("tables", tmp_path) == tmp_path / "tables.safetensors"
+
+
+def test_codes_that_are_not_finite_have_no_directions():
+    with pytest.raises(ValueError, match="not finite"):
+        Directions.of(torch.full((3, 4), math.nan), 1)
+
+
+def test_other_arrays_are_no_directions(tmp_path):
+    weights.write(tmp_path / "x.safetensors", {"x": torch.zeros(2)}, "Directions", {})
+    with pytest.raises(CheckpointError, match=r"found the arrays \['x'\]; expected \['axes'"):
+        Directions.load(tmp_path / "x.safetensors")

@@ -207,3 +207,8 @@ def test_what_touches_goes_on_touching():
     assert all(before <= each for each in after)
     apart = program.with_parameters(program.parameters() * 0.8)
     assert _touching([execute(parse(BOX))]) == [{(-1, 0)}] and _touching([execute(apart)]) != [before]
+
+
+def test_nothing_but_a_bounding_box_hangs_over_nothing():
+    program = parse("Assembly Program_0 {\n    bbox = Cuboid(1, 1, 1, True)\n}\n")
+    assert float(overhang(execute(program))) == 0 and len(variants(program, 2)) == 2

@@ -126,6 +126,8 @@ def test_a_network_that_writes_nothing(method, tmp_path, capsys):
         (["--method", "flat"], "--method flat needs --weights"),
         (["--weights", "nowhere.safetensors"], "nowhere.safetensors"),
         (["--samples", "7"], f"--samples is 7; expected at least {LEAST}"),
+        (["--method", "ground_truth", "--seed", "-1"], "--seed is -1; expected 0 to"),
+        (["--method", "validation", "--seed", str(10**20)], f"--seed is {10**20}; expected 0 to"),
     ],
 )
 def test_what_cannot_be_measured(options, said, tmp_path, capsys):

@@ -115,6 +115,17 @@ def test_the_quick_training_writes_weights_and_a_card(tmp_path, monkeypatch, cap
 def test_a_place_that_cannot_be_written_is_told_first(tmp_path, capsys):
     assert train_point_net.main(["--quick", "--out", str(tmp_path)]) == 1
     assert "is a folder" in capsys.readouterr().err
+    (tmp_path / "net.md").mkdir()
+    assert train_point_net.main(["--quick", "--out", str(tmp_path / "net.safetensors")]) == 1
+    assert "net.md is a folder" in capsys.readouterr().err
+
+
+def test_bad_options_are_told_before_training(tmp_path, capsys):
+    out = tmp_path / "net.md"  # the card, which has this name, would replace the weights
+    assert train_point_net.main(["--quick", "--out", str(out)]) == 1
+    assert "where the card goes" in capsys.readouterr().err and not out.exists()
+    assert train_point_net.main(["--quick", "--seed", "-1", "--out", str(tmp_path / "net.safetensors")]) == 1
+    assert "--seed is -1; expected 0 to" in capsys.readouterr().err
 
 
 def test_ranges_of_leaf_parts_have_names():

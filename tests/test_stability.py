@@ -156,3 +156,12 @@ def test_most_real_chairs_stand(real_texts, unchecked_shapes):
     texts = real_texts["chair"]
     shapes = execute_many([parse(texts[name]) for name in sorted(texts)[:100]])
     assert 0.70 <= stable_many(shapes).mean() <= 0.98
+
+
+@pytest.mark.parametrize("length", [1e9, 1e200])
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_a_shape_too_large_to_simulate_is_not_stable_and_ends(length, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file where it runs
+    sides = torch.tensor([[length, 1.0, 1.0]], dtype=torch.float64)
+    giant = Cuboids(sides, sides / 2, torch.eye(3, dtype=torch.float64)[None])
+    assert not stable(giant)

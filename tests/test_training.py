@@ -93,7 +93,8 @@ def test_the_rate_grows_and_falls():
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"epochs": 0}, {"batch": 0}, {"rate": 0.0}, {"rate": math.nan}, {"warmup": 2.0}, {"clip": -1.0}, {"seed": -1}],
+    [{"epochs": 0}, {"batch": 0}, {"rate": 0.0}, {"rate": math.nan}, {"rate": math.inf}, {"warmup": 2.0},
+     {"clip": -1.0}, {"seed": -1}, {"seed": 2**63}],
 )  # fmt: skip
 def test_settings_without_sense_are_told(wrong):
     [name] = wrong
@@ -187,6 +188,24 @@ def test_a_loss_that_is_not_finite_stops_it_and_keeps_the_last_epoch(tmp_path):
     with pytest.raises(TrainingError, match="epoch 2, batch 2: loss nan.*lower rate"):
         fit(task, SCHEDULE, tmp_path)
     assert [row["epoch"] for row in read(tmp_path / CHECKPOINT, KIND)[1]["log"]] == [1]
+
+
+@pytest.mark.parametrize("spoilt", ["slope", "line.weight"])
+def test_numbers_that_the_last_step_spoils_are_not_kept(tmp_path, spoilt):
+    task = Line()
+
+    def report(network):
+        if spoilt == "line.weight":
+            network["line"].weight.data.fill_(math.nan)
+            return {}
+        return {"slope": math.nan}
+
+    task.report = report
+    with pytest.raises(
+        TrainingError, match=f"epoch 1: found .* not finite at its end, in {spoilt};.*lower rate"
+    ):
+        fit(task, SCHEDULE, tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 def test_nothing_to_learn_from_is_told(tmp_path):
@@ -350,12 +369,22 @@ def test_the_papers_settings(embedded, tmp_path, unchecked_shapes):
         (["--limit", "0"], "TrainingError: limit is 0; expected at least 1"),
         (["--threads", "0"], "TrainingError: threads is 0"),
         (["--kl", "-1"], "TrainingError: annealing is 0.0, kl -1.0"),
+        (["--seed", str(10**30)], "TrainingError: seed is 1000"),
     ],
 )
 def test_bad_options_are_told_in_one_line(embedded, tmp_path, capsys, options, told):
     assert train(*options, "--out", tmp_path) == 1
     error = capsys.readouterr().err
     assert error.startswith(told) and error.count("\n") == 1
+
+
+def test_a_file_in_the_place_of_the_folder_is_told_before_the_first_epoch(embedded, tmp_path, capsys):
+    (tmp_path / "mine").write_text("mine")
+    assert train("--limit", 2, "--epochs", 1, "--out", tmp_path / "mine") == 1
+    told = capsys.readouterr()
+    assert (
+        told.err.startswith("TrainingError: ") and "mine is a file" in told.err and "epoch 1" not in told.out
+    )
 
 
 def test_a_foreign_checkpoint_is_told_in_one_line(embedded, tmp_path, capsys, unchecked_shapes):

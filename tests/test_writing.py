@@ -351,3 +351,15 @@ def test_rules_are_a_value():
     assert (
         Rules() == Rules() and dataclasses.replace(Rules(), near=0.1, outside=0.5, same_side=True) == AUTHORS
     )
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"count": -1}, {"count": 1, "spread": math.nan}, {"count": 1, "spread": -1.0}]
+)
+def test_samples_that_make_no_sense_are_told(trained, wrong):
+    with pytest.raises(ValueError, match="expected 0 or more"):
+        sample(trained, **wrong)
+
+
+def test_of_no_programs_there_are_no_reconstructions(trained):
+    assert reconstruct(trained, []).programs == []

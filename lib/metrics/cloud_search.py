@@ -70,6 +70,8 @@ def nearest_clouds(
     """
     mine = _Clouds(queries, "queries")
     theirs = mine if others is None else _Clouds(others, "others")
+    if not len(mine):
+        raise ValueError("found no queries; expected at least one cloud")
     if len(theirs) < 1 + (others is None):
         raise ValueError(f"found {len(theirs)} clouds; expected another one that can be the nearest")
     with ThreadPoolExecutor(workers) as pool:

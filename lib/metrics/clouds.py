@@ -22,7 +22,7 @@ def surface_points_many(
     sets that are to be compared want different seeds: with the same one, equal shapes at the same place get equal
     points, and a distance of 0. Without gradient. Raises ValueError for a shape without finite boxes of some area.
     """
-    cuboids, count = _leaves(shapes)
+    cuboids, count = _leaves(shapes if len(shapes) else [])
     _check(cuboids, count, n)
     stops = torch.tensor([0, *count]).cumsum(0)
     parts = [

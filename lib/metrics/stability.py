@@ -70,7 +70,8 @@ def stable_many(
 
 def height_changes(shapes: Sequence[Shape | Cuboids], trial: Trial = TRIAL) -> Float[np.ndarray, " shapes"]:
     """How much higher or lower a push leaves each shape: |end - start| of a component's center of mass over the
-    component's height, the largest of its components. Infinite for a shape that is not rooted, 0 for one without boxes.
+    component's height, the largest of its components. Infinite for a shape that is not rooted, and for one
+    too large to be simulated; 0 for one without boxes.
     """
     links = Links.of(shapes)
     rooted = [bool(part.all()) for part in links.split(links.grounded())]
@@ -93,6 +94,8 @@ def _height_change(boxes: Cuboids, component: Int[np.ndarray, " n"], trial: Tria
     start = _heights(state)
     push(trial, world, state, extent)
     let_settle(world, state)
+    if broke_down(state):
+        return np.inf
     return float((np.abs(_heights(state) - start) / extent[:, 1]).max())
 
 
@@ -116,6 +119,16 @@ def push(
 def let_settle(world: mujoco.MjModel, state: mujoco.MjData) -> None:
     """Simulate until everything has been still for a while; for LONGEST at most."""
     steps, still = round(LOOK_EVERY / world.opt.timestep), 0
-    while still < LOOKS and state.time < LONGEST:
+    while still < LOOKS and state.time < LONGEST and not broke_down(state):
         mujoco.mj_step(world, state, steps)
         still = still + 1 if np.abs(state.qvel).max() < STILL else 0
+
+
+def broke_down(state: mujoco.MjData) -> bool:
+    """Did the numbers get too large, as for boxes of 1e9 m? MuJoCo then begins anew at time 0, again and again."""
+    bad = (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+    return any(state.warning[kind].number > 0 for kind in bad)

@@ -20,7 +20,7 @@ from torch import Tensor
 from ..interpreters.shapeassembly import Program
 from .program_table import ProgramTable, batch_of
 from .program_vae import ProgramVAE
-from .weights import read, write
+from .weights import CheckpointError, read, write
 from .writing import write as write_programs
 
 AT_ONCE = 256  # programs: bounds the memory
@@ -128,11 +128,14 @@ class Directions:
     def of(cls, codes: Float[Tensor, "codes latent"], count: int = 8) -> "Directions":
         """Of some codes. An axis points to where its largest entry is positive.
 
-        Raises ValueError for more directions than codes can have: one less than there are, at most their width.
+        Raises ValueError for more directions than codes can have: one less than there are, at most their width;
+        and for codes that are not finite.
         """
         most = min(len(codes) - 1, codes.shape[-1])
         if not 1 <= count <= most:
             raise ValueError(f"found {count} directions; expected 1 to {most} for {len(codes)} codes")
+        if not codes.isfinite().all():
+            raise ValueError("found codes that are not finite numbers")
         codes = codes.detach().cpu().double()
         mean = codes.mean(0)
         _, scale, axes = torch.linalg.svd(codes - mean, full_matrices=False)
@@ -164,4 +167,6 @@ class Directions:
     def load(cls, path: Path) -> "Directions":
         """What `save` wrote. Raises CheckpointError for anything else."""
         tensors, _ = read(path, "Directions")
+        if (found := sorted(tensors)) != (expected := sorted(cls.__dataclass_fields__)):
+            raise CheckpointError(f"{path}: found the arrays {found}; expected {expected}")
         return cls(**tensors)

@@ -66,6 +66,8 @@ def write(path: Path, tensors: dict[str, Tensor], kind: str, facts: dict) -> Non
 
 def read(path: Path, kind: str) -> tuple[dict[str, Tensor], dict]:
     """What `write` wrote: arrays and facts. Raises CheckpointError for anything else, or another kind."""
+    if Path(path).is_dir():
+        raise CheckpointError(f"{path}: cannot be read (it is a folder; expected a file)")
     try:
         with safetensors.safe_open(path, framework="pt") as file:
             entry = (file.metadata() or {}).get(ENTRY)

@@ -110,8 +110,11 @@ def sample(
     spread       standard deviation of the codes: below 1, shapes nearer to the usual ones
     temperature  of the choices, see `write`; all chance comes from `seed`
     codes        what codes are drawn from; default: the standard normal distribution, as in the paper
-    The first programs are the same for every `count`. Raises RuntimeError where hardly any code gives a program.
+    The first programs are the same for every `count`. Raises RuntimeError where hardly any code gives a program, and
+    ValueError for a count or a spread below 0.
     """
+    if count < 0 or not 0 <= spread < math.inf:
+        raise ValueError(f"a count of {count}, a spread of {spread}; expected 0 or more, both finite")
     noise = torch.Generator().manual_seed(seed)
     network = _on_cpu(network)
     programs: list[Program] = []
@@ -136,6 +139,8 @@ def sample(
 
 def reconstruct(network: ProgramVAE, programs: Sequence[Program], rules: Rules | None = None) -> Written:
     """Programs through the encoder and back; lines that break a rule are left out."""
+    if not len(programs):
+        return Written([], [])
     network, table = _on_cpu(network), ProgramTable.of(programs)
     with torch.no_grad():
         latent = network.encode(batch_of(table, range(len(table)))).mean

@@ -122,6 +122,7 @@ def _train(command: Command, options: argparse.Namespace, folder: Path, line: st
         figures = ", ".join(f"{name} {row[name]:.4g}" for name in ("loss", "val_loss") if name in row)
         print(f"epoch {row['epoch']}/{job.schedule.epochs}: {figures}, {row['seconds']:.0f} s", flush=True)
 
+    _check_folder(folder)
     if fabric.is_global_zero:
         print(job.data, flush=True)
     log = fit(job.task, job.schedule, folder, fabric, told)
@@ -131,6 +132,15 @@ def _train(command: Command, options: argparse.Namespace, folder: Path, line: st
         facts = _facts(job, log, fabric, line)
         path.with_suffix(".json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
         print(f"weights: {path}; how they came to be: {path.with_suffix('.json')}")
+
+
+def _check_folder(folder: Path) -> None:
+    """Makes the folder of the run: told before the first epoch, not after. Raises TrainingError for a file there."""
+    if folder.exists() and not folder.is_dir():
+        raise TrainingError(f"{folder} is a file; expected a folder for the run, or none yet")
+    folder.mkdir(parents=True, exist_ok=True)
+    if not os.access(folder, os.W_OK):
+        raise TrainingError(f"{folder} cannot be written to; expected a folder of yours")
 
 
 def _facts(job: Job, log: list[dict], fabric: Fabric, line: str) -> dict:

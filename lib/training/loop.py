@@ -28,6 +28,8 @@ from .checkpoints import Checkpoint, read_checkpoint, write_checkpoint
 EPSILON = 1e-6  # of Adam, as in the ShapeAssembly authors' program
 CHECKPOINT, LOG = "checkpoint.safetensors", "log.jsonl"  # what a run keeps in its folder
 SHOW_EVERY = 10  # batches
+LARGEST_SEED = 2**63 - 1  # that torch takes
+LARGEST_RATE = 1e6  # Adam moves a weight about so far in a step: more is a slip of the keyboard
 
 
 class TrainingError(RuntimeError):
@@ -61,9 +63,12 @@ class Schedule:
         for name, least in {"epochs": 1, "batch": 1, "seed": 0}.items():
             if (value := getattr(self, name)) < least:
                 raise TrainingError(f"{name} is {value}; expected at least {least}")
-        for name, most in {"rate": math.inf, "clip": math.inf}.items():
-            if not 0 < (value := getattr(self, name)) <= most:
-                raise TrainingError(f"{name} is {value}; expected a number above 0")
+        if self.seed > LARGEST_SEED:
+            raise TrainingError(f"seed is {self.seed}; expected at most {LARGEST_SEED}")
+        if not 0 < self.rate <= LARGEST_RATE:
+            raise TrainingError(f"rate is {self.rate}; expected a number above 0, at most {LARGEST_RATE:g}")
+        if not self.clip > 0:
+            raise TrainingError(f"clip is {self.clip}; expected a number above 0")
         for name in ("warmup", "last"):
             if not 0 <= (value := getattr(self, name)) <= 1:
                 raise TrainingError(f"{name} is {value}; expected a share from 0 to 1")
@@ -171,7 +176,19 @@ class _Run:
         self.network.eval()
         seconds = before.get("seconds", 0.0) + time.perf_counter() - start
         found = means | self.task.report(self.task.network)
+        self._check(epoch, found)
         return {"epoch": epoch + 1, **_rounded(found), "seconds": round(seconds, 1)}
+
+    def _check(self, epoch: int, found: dict[str, float]) -> None:
+        """The last step of an epoch can spoil weights, and no later loss would tell."""
+        wrong = [name for name, value in found.items() if not math.isfinite(value)]
+        weights = self.task.network.named_parameters()
+        wrong += [name for name, weight in weights if not weight.isfinite().all()]
+        if wrong:
+            raise TrainingError(
+                f"epoch {epoch + 1}: found numbers that are not finite at its end, in {wrong[0]}; expected finite "
+                "ones: try a lower rate, or a smaller clip"
+            )
 
     def step(self, batch: np.ndarray, seed: list[int], progress: float) -> dict[str, Tensor]:
         """One update of the weights; each process takes its share of the batch. The terms are weighted by the share."""

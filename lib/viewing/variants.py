@@ -81,6 +81,8 @@ def overhang(shape: Shape) -> Float[Tensor, ""]:
     """How far boxes reach beyond the box they lie in, as a share of its half sides; the largest, at least 0."""
     parents = torch.tensor(shape.parents)
     inner = (parents >= 0).nonzero().squeeze(-1)
+    if not len(inner):  # a program of nothing but a bounding box
+        return shape.boxes.size.new_zeros(())
     within = shape.boxes[parents[inner]]
     corners = within.local_many(shape.boxes[inner].corners())
     return ((corners - 0.5).abs() * 2 - 1).amax().clamp(min=0)

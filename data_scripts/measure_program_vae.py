@@ -57,7 +57,7 @@ LOOSE = (
     "ours_drawn",
     "ours_fitted",
 )  # methods with the tolerances of the authors' program
-WRITTEN = ("ours", *LOOSE, "no_reject", *ABLATIONS)
+WRITTEN = ("ours", *LOOSE, "ours_fitted", "no_reject", *ABLATIONS)
 METHODS = (*WRITTEN, "ground_truth", "validation", "interpolation")
 CLOUD = 1_024  # points on a shape, for what PointNet sees
 FITTED_SPREAD = 0.9  # of codes from a fitted distribution: somewhat nearer to its middle
@@ -127,7 +127,8 @@ def written_row(category: str, method: str, network: ProgramVAE, samples: int, s
             "near": rules.near,
             "outside": rules.outside,
             "temperature": temperature,
-            "fitted_codes": codes is not None,
+            "fitted_codes": fitted,
+            "spread": spread,
         },
         "rejected_percent": 100 * found.rejection_rate,
         **quality(shapes, train, seed),

@@ -6,6 +6,7 @@ import math
 import pytest
 import torch
 
+from lib.datasets import shapeassembly
 from lib.interpreters.shapeassembly import (
     Attach,
     Block,
@@ -234,7 +235,7 @@ def test_a_network_that_writes_nothing_is_told(monkeypatch):
 
 @pytest.mark.usefixtures("unchecked_shapes")
 def test_reconstructions_are_one_for_each_program(trained):
-    programs = list(datasets.shapeassembly("chair"))[:6]
+    programs = list(shapeassembly("chair"))[:6]
     written = reconstruct(trained, programs)
     assert len(written.programs) == 6 and len(written.accepted) >= 5
     check(written.accepted, Rules())

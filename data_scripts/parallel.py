@@ -69,7 +69,9 @@ def end_with(parent: int | None) -> None:
     """Ends this process, unless it is its own parent, soon after that one: joblib's workers would wait for ever."""
     if parent is None or os.getpid() == parent:
         return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C comes here too: the parent ends its workers
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # a terminal's Ctrl-C comes here too: the parent ends its workers
 
     def watch() -> None:
         while os.getppid() == parent:

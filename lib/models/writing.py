@@ -161,6 +161,7 @@ class _Writer:
     count: list[int] = field(default_factory=list)  # blocks of each program
 
     def write(self, latent: Tensor) -> Written:
+        """The programs of some codes, level by level."""
         sizes = self.network.root_size(latent).clamp(min=SMALLEST)
         finite = (latent.isfinite() & sizes.isfinite().all(-1, keepdim=True)).all(-1)
         self.reasons = ["" if good else "its bounding box is not finite" for good in finite.tolist()]

@@ -55,6 +55,7 @@ class LevelWriter:
         self.rows = torch.arange(n)[~self._given_up(range(n))]  # blocks that are still being written
 
     def run(self) -> None:
+        """Write until every block has ended, or is given up."""
         self._begin()
         for _ in range(MAX_STEPS):
             if not len(self.rows):

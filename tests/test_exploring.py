@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from lib import datasets
-from lib.models import exploring, weights
+from lib.models import code_distribution, weights
 from lib.models.exploring import Directions, analogy, arc, codes, interpolate, mean_code, straight
 from lib.models.pretrained import pretrained
 from lib.models.program_vae import ProgramVAE, ProgramVAEConfig
@@ -40,7 +40,7 @@ def writer():
 def test_codes_do_not_depend_on_the_batch(network, chairs, monkeypatch):
     together = codes(network, chairs)
     assert together.shape == (12, 24) and not together.requires_grad
-    monkeypatch.setattr(exploring, "AT_ONCE", 5)
+    monkeypatch.setattr(code_distribution, "AT_ONCE", 5)
     assert torch.allclose(codes(network, chairs), together, atol=1e-6)
     assert codes(network, []).shape == (0, 24)
 

@@ -16,10 +16,25 @@ from torch import Tensor
 
 from ..interpreters.shapeassembly import Program
 from .program_table import ProgramTable, batch_of
-from .program_vae import ProgramVAE
+from .program_vae import Posterior, ProgramVAE
 from .weights import read, write
 
 AT_ONCE = 256  # programs: bounds the memory
+
+
+@torch.no_grad()
+def encoded(network: ProgramVAE, programs: Sequence[Program]) -> Posterior:
+    """Where the encoder believes each program's code to be.
+
+    Raises ProgramError for a block with more cuboids than a line has room for.
+    """
+    device = network.first_state.device
+    nothing = torch.zeros(0, network.config.hidden, device=device)
+    parts = [Posterior(nothing, nothing)]
+    for first in range(0, len(programs), AT_ONCE):
+        table = ProgramTable.of(programs[first : first + AT_ONCE])
+        parts.append(network.encode([level.to(device) for level in batch_of(table, range(len(table)))]))
+    return Posterior(*(torch.cat([getattr(p, name) for p in parts]) for name in ("mean", "log_variance")))
 
 
 @dataclass(frozen=True)
@@ -34,19 +49,12 @@ class CodeDistribution:
     factor: Float[Tensor, "latent latent"]
 
     @classmethod
-    @torch.no_grad()
     def of(cls, network: ProgramVAE, programs: Sequence[Program]) -> "CodeDistribution":
         """Of some programs' codes. Raises ValueError for fewer than two programs."""
         if len(programs) < 2:
             raise ValueError(f"found {len(programs)} programs; expected at least 2, to have a covariance")
-        means, variances = [], []
-        for first in range(0, len(programs), AT_ONCE):
-            table = ProgramTable.of(programs[first : first + AT_ONCE])
-            levels = [level.to(network.first_state.device) for level in batch_of(table, range(len(table)))]
-            posterior = network.encode(levels)
-            means.append(posterior.mean.cpu().double())
-            variances.append(posterior.log_variance.cpu().double().exp())
-        codes, blur = torch.cat(means), torch.cat(variances).mean(0)
+        posterior = encoded(network, programs)
+        codes, blur = posterior.mean.cpu().double(), posterior.log_variance.cpu().double().exp().mean(0)
         factor = torch.linalg.cholesky(torch.cov(codes.T) + torch.diag(blur))
         return cls(codes.mean(0).float(), factor.float())
 

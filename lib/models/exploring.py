@@ -18,28 +18,20 @@ from jaxtyping import Float
 from torch import Tensor
 
 from ..interpreters.shapeassembly import Program
-from .program_table import ProgramTable, batch_of
+from .code_distribution import encoded
 from .program_vae import ProgramVAE
 from .weights import CheckpointError, read, write
 from .writing import write as write_programs
 
-AT_ONCE = 256  # programs: bounds the memory
 Way = Callable[[Tensor, Tensor, int], Tensor]
 
 
-@torch.no_grad()
 def codes(network: ProgramVAE, programs: Sequence[Program]) -> Float[Tensor, "programs latent"]:
     """The latent code of each program: the mean of its distribution.
 
     Raises ProgramError for a block with more cuboids than a line has room for.
     """
-    device = network.first_state.device
-    found = [torch.zeros(0, network.config.hidden, device=device)]
-    for first in range(0, len(programs), AT_ONCE):
-        table = ProgramTable.of(programs[first : first + AT_ONCE])
-        levels = [level.to(device) for level in batch_of(table, range(len(table)))]
-        found.append(network.encode(levels).mean)
-    return torch.cat(found)
+    return encoded(network, programs).mean
 
 
 def straight(

@@ -25,8 +25,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from ..interpreters.shapeassembly import Program, ProgramError, execute_many
-from .code_distribution import CodeDistribution
-from .program_table import ProgramTable, batch_of
+from .code_distribution import CodeDistribution, encoded
 from .program_vae import ProgramVAE
 from .writing_level import LevelWriter
 from .writing_line import SMALLEST, LineWriter
@@ -139,12 +138,7 @@ def sample(
 
 def reconstruct(network: ProgramVAE, programs: Sequence[Program], rules: Rules | None = None) -> Written:
     """Programs through the encoder and back; lines that break a rule are left out."""
-    if not len(programs):
-        return Written([], [])
-    network, table = _on_cpu(network), ProgramTable.of(programs)
-    with torch.no_grad():
-        latent = network.encode(batch_of(table, range(len(table)))).mean
-    return write(network, latent, "skip", rules)
+    return write(network, encoded(network, programs).mean, "skip", rules)
 
 
 def _on_cpu(network: ProgramVAE) -> ProgramVAE:

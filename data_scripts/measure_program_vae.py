@@ -4,8 +4,8 @@
     python -m data_scripts.measure_program_vae chair --method no_reject       the same, invalid lines left out instead
     python -m data_scripts.measure_program_vae chair --method ours_authors_rules       their tolerances: 50 %, not 10 %
     python -m data_scripts.measure_program_vae chair --method ours_drawn      and choices drawn at temperature 1
-    python -m data_scripts.measure_program_vae chair --method ours_fitted     their tolerances, and codes drawn from
-                                                                              where those of real programs lie
+    python -m data_scripts.measure_program_vae chair --method ours_fitted     the paper's tolerances, and codes drawn
+                                                                              from where those of real programs lie
     python -m data_scripts.measure_program_vae chair --method flat --weights runs/chair-flat/program_vae.safetensors
     python -m data_scripts.measure_program_vae chair --method ground_truth    the real programs themselves
     python -m data_scripts.measure_program_vae chair --method validation      the row "Validation" of Table 4
@@ -53,15 +53,12 @@ from lib.training.realism import percent_fooled
 FOLDER = REPOSITORY / "results" / "program_vae"
 PRETRAINED = REPOSITORY / "pretrained"
 ABLATIONS = ("flat", "no_order", "no_align", "no_macros")
-LOOSE = (
-    "ours_authors_rules",
-    "ours_drawn",
-    "ours_fitted",
-)  # methods with the tolerances of the authors' program
-WRITTEN = ("ours", *LOOSE, "no_reject", *ABLATIONS)
+LOOSE = ("ours_authors_rules", "ours_drawn")  # methods with the tolerances of the authors' program
+WRITTEN = ("ours", *LOOSE, "ours_fitted", "no_reject", *ABLATIONS)
 METHODS = (*WRITTEN, "ground_truth", "validation", "interpolation")
 CLOUD = 1_024  # points on a shape, for what PointNet sees
-FITTED_SPREAD = 0.9  # of codes from a fitted distribution: somewhat nearer to its middle
+# Of codes from a fitted distribution, somewhat nearer to its middle: chosen on samples of seed 1, of 0.75 to 1.
+FITTED_SPREAD = {"chair": 0.85, "table": 1.0, "storage": 0.9}
 QUICK = 48
 LEAST = 8  # samples: a classifier needs some to learn from, and some that it has not seen
 SEQUENCES, STEPS = 100, 100  # of Table 6
@@ -112,8 +109,8 @@ def written_row(category: str, method: str, network: ProgramVAE, samples: int, s
     rules = AUTHORS if method in LOOSE else Rules()
     temperature = 1.0 if method == "ours_drawn" else 0.0
     fitted = method == "ours_fitted"
-    codes = CodeDistribution.of(network, real) if fitted else None
-    spread = FITTED_SPREAD if fitted else 1.0
+    codes = CodeDistribution.of(network, known) if fitted else None
+    spread = FITTED_SPREAD[category] if fitted else 1.0
     start = time.perf_counter()
     try:
         found = sample(network, samples, seed, mode, rules, spread, temperature, codes)

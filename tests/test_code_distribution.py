@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from lib.datasets import shapeassembly
+from lib.datasets import CATEGORIES, shapeassembly
 from lib.models.code_distribution import CodeDistribution
 from lib.models.exploring import codes
 from lib.models.pretrained import pretrained
@@ -49,6 +49,18 @@ def test_it_comes_back_from_its_file(fitted, tmp_path):
     assert torch.equal(again.mean, fitted.mean) and torch.equal(again.factor, fitted.factor)
     with pytest.raises(CheckpointError, match="kind"):
         CodeDistribution.load(pretrained("program_vae_chair"))
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_those_that_come_with_the_project(category):
+    programs = shapeassembly(category, "train")
+    if programs.source != "real":
+        pytest.skip("the real programs are not fetched")
+    own = load(ProgramVAE, pretrained(f"program_vae_{category}"))
+    kept = CodeDistribution.load(pretrained(f"program_vae_{category}_codes"))
+    found = CodeDistribution.of(own, list(programs))
+    torch.testing.assert_close(kept.mean, found.mean, rtol=0, atol=1e-4)
+    torch.testing.assert_close(kept.factor, found.factor, rtol=0, atol=1e-3)
 
 
 def test_one_program_has_no_covariance(network):

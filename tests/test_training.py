@@ -14,6 +14,8 @@ import pytest
 import torch
 from torch import nn
 
+from lib.datasets import shapeassembly
+from lib.models.code_distribution import CodeDistribution
 from lib.models.program_vae import ProgramVAE
 from lib.models.weights import CheckpointError, load, read, write
 from lib.training import commands, loop
@@ -348,6 +350,9 @@ def test_the_command_leaves_weights_and_facts(embedded, tmp_path, capsys, unchec
     path = tmp_path / "run" / "program_vae.safetensors"
     assert str(path) in said
     assert sum(weight.numel() for weight in load(ProgramVAE, path).parameters()) == 2146755
+    codes = CodeDistribution.load(path.with_name("program_vae_codes.safetensors"))
+    expected = CodeDistribution.of(load(ProgramVAE, path), list(shapeassembly("chair", "train")[:4]))
+    torch.testing.assert_close(codes.factor, expected.factor, rtol=0, atol=1e-5)
     facts = json.loads(path.with_suffix(".json").read_text())
     assert facts["seed"] == 0 and facts["epochs"] == 2 and facts["losses"]["val_loss"] > 0
     assert facts["settings"]["batch"] == 32 and facts["settings"]["weights"]["kl"] == 0.2

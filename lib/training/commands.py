@@ -3,7 +3,7 @@
 OUT/checkpoint.safetensors   the run after its last whole epoch: the same command goes on from it
 OUT/log.jsonl                one line an epoch
 OUT/NAME.safetensors         at the end: the weights, for lib.models.weights.load
-OUT/NAME.json                and how they came to be
+OUT/NAME.json                and how they came to be; what else a network needs lies beside them
 """
 
 import argparse
@@ -44,12 +44,18 @@ class Setting:
 
 @dataclass(frozen=True)
 class Job:
-    """What a command line asks for. network: what is saved in the end; data: one sentence about it."""
+    """What a command line asks for.
+
+    network  what is saved in the end
+    data     one sentence about what it learned from
+    finish   what else belongs to the trained network: told where its weights were saved, writes files beside them
+    """
 
     task: Task
     schedule: Schedule
     network: nn.Module
     data: str
+    finish: Callable[[Path], None] = lambda weights: None
 
 
 @dataclass(frozen=True)
@@ -129,6 +135,7 @@ def _train(command: Command, options: argparse.Namespace, folder: Path, line: st
     if fabric.is_global_zero:
         path = folder / f"{options.name}.safetensors"
         save(job.network, path)
+        job.finish(path)
         facts = _facts(job, log, fabric, line)
         path.with_suffix(".json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
         print(f"weights: {path}; how they came to be: {path.with_suffix('.json')}")

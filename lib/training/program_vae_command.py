@@ -4,6 +4,8 @@ The paper trains on one program at a time, with a rate of 0.0001 (`--paper`). Wi
 rate that falls along half a cosine, which is the same model in a fraction of the time. The authors stopped after
 120 epochs (chair, storage) and 80 (table). Their weight of 0.1 for the KL term is 0.2 here: see `program_loss`.
 
+OUT/program_vae_codes.safetensors   at the end: where the codes of the training programs lie, a `CodeDistribution`
+
 One thread is the default: the matrices are small, and threads that share busy cores wait for one another at each of
 them.
 """
@@ -17,6 +19,7 @@ import torch
 
 from ..datasets import CATEGORIES, shapeassembly
 from ..extractor.rewriting import ABLATIONS
+from ..models.code_distribution import CodeDistribution
 from ..models.program_vae import ProgramVAE
 from .commands import Command, Job, Setting
 from .loop import Schedule, TrainingError
@@ -70,7 +73,14 @@ def job(options: argparse.Namespace) -> Job:
     }  # fmt: skip
     other = table_of(others) if len(others) else None
     task = ProgramTask(ReadAndWrite(network), table_of(programs), other, weights, options.annealing, about)
-    return Job(task, schedule, network, programs.describe())
+
+    def keep_codes(path: Path) -> None:
+        if len(programs) > 1:  # one has no covariance
+            CodeDistribution.of(network, list(programs)).save(
+                path.with_name(f"{path.stem}_codes.safetensors")
+            )
+
+    return Job(task, schedule, network, programs.describe(), keep_codes)
 
 
 COMMAND = Command(

@@ -30,6 +30,7 @@ from lib.viewing.variants import Amounts, variants
 
 STOPS = (-2.0, -1.0, 0.0, 1.0, 2.0)  # standard deviations
 ROW_NAMES = ("nearest by geometry", "written by the network", "nearest by program")
+NAME_WIDTH = 0.3  # inches, left of the pictures
 
 
 def line_count(program: Program) -> int:
@@ -150,11 +151,13 @@ def shapes_of(programs: Sequence[Program | None]) -> list[Shape | None]:
 
 
 def _with_row_names(figure: Figure, names: Sequence[str]) -> Figure:
-    """A name at the left edge of each row of pictures."""
-    columns = len(figure.axes) // len(names)
+    """A name left of each row of pictures, which make room for it."""
+    columns, margin = len(figure.axes) // len(names), NAME_WIDTH / figure.get_figwidth()
+    for ax in figure.axes:
+        left, bottom, width, height = ax.get_position().bounds
+        ax.set_position([margin + (1 - margin) * left, bottom, (1 - margin) * width, height])
     for row, name in enumerate(names):
-        ax = figure.axes[row * columns]  # inside the axes, which begin at the edge of the figure
-        ax.text(
-            0.01, 0.5, name, transform=ax.transAxes, rotation=90, va="center", fontsize=9, color="#3b4252"
-        )
+        box = figure.axes[row * columns].get_position()
+        middle = (box.y0 + box.y1) / 2
+        figure.text(margin / 2, middle, name, rotation=90, va="center", ha="center", fontsize=9, color="#3b4252")
     return figure

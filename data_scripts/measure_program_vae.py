@@ -44,6 +44,7 @@ from lib.metrics.stability import AUTHORS_TRIAL, stable_many
 from lib.metrics.structures import novel_share
 from lib.models.code_distribution import CodeDistribution
 from lib.models.point_net import PointNet
+from lib.models.pretrained import pretrained
 from lib.models.program_vae import ProgramVAE
 from lib.models.weights import CheckpointError, load
 from lib.models.writing import sample, write
@@ -51,7 +52,6 @@ from lib.models.writing_rules import AUTHORS, Rules
 from lib.training.realism import percent_fooled
 
 FOLDER = REPOSITORY / "results" / "program_vae"
-PRETRAINED = REPOSITORY / "pretrained"
 ABLATIONS = ("flat", "no_order", "no_align", "no_macros")
 LOOSE = ("ours_authors_rules", "ours_drawn")  # methods with the tolerances of the authors' program
 WRITTEN = ("ours", *LOOSE, "ours_fitted", "no_reject", *ABLATIONS)
@@ -66,7 +66,7 @@ SEQUENCES, STEPS = 100, 100  # of Table 6
 
 def quality(shapes: Shapes, train: Shapes, seed: int) -> dict[str, float]:
     """Table 2: percent rooted, stable and fool, and the Fréchet distance."""
-    point_net = load(PointNet, PRETRAINED / "point_net.safetensors")
+    point_net = load(PointNet, pretrained("point_net"))
     # Both depend on how many shapes are compared: as many real ones as there are generated ones, if there are.
     some = np.random.default_rng(seed).permutation(len(train))[: len(shapes)]
     pair = (shapes, [train[i] for i in some])
@@ -217,7 +217,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true", help=f"{QUICK} samples")
     parser.add_argument("--out", type=Path, help="default: results/program_vae/CATEGORY_METHOD.json")
     options = parser.parse_args(arguments)
-    weights = options.weights or PRETRAINED / f"program_vae_{options.category}.safetensors"
     out = options.out or FOLDER / f"{options.category}_{options.method}.json"
 
     def work() -> None:
@@ -229,6 +228,7 @@ def main(arguments: list[str] | None = None) -> int:
             raise DataError(f"--samples is {samples}; expected at least {LEAST}")
         check_seed(options.seed)
         try:
+            weights = options.weights or pretrained(f"program_vae_{options.category}")
             row = measure(options.category, options.method, weights, samples, options.seed)
         except CheckpointError as error:
             raise DataError(str(error)) from error

@@ -154,6 +154,8 @@ def test_what_was_measured_is_told(folder):
         ("{", "not a result"),
         ("[1]", "found list"),
         ('{"category": "chair", "method": "flat"}', "found ('chair', 'flat'); expected ('table', 'ours')"),
+        ('{"category": "table", "method": "ours", "rooted": "96"}', "rooted is '96'; expected a number"),
+        ('{"category": "table", "method": "ours", "lines": true}', "lines is True; expected a number"),
     ],
 )
 def test_a_file_that_is_no_result(content, said, tmp_path):

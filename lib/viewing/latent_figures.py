@@ -159,5 +159,7 @@ def _with_row_names(figure: Figure, names: Sequence[str]) -> Figure:
     for row, name in enumerate(names):
         box = figure.axes[row * columns].get_position()
         middle = (box.y0 + box.y1) / 2
-        figure.text(margin / 2, middle, name, rotation=90, va="center", ha="center", fontsize=9, color="#3b4252")
+        figure.text(
+            margin / 2, middle, name, rotation=90, va="center", ha="center", fontsize=9, color="#3b4252"
+        )
     return figure

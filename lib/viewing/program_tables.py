@@ -114,6 +114,9 @@ def _row(path: Path, category: str, method: str) -> dict:
     found = (row.get("category"), row.get("method")) if isinstance(row, dict) else type(row).__name__
     if found != (category, method):
         raise ResultError(f"{path}: found {found}; expected {(category, method)}, as its name says")
+    for quantity in {q for layout in TABLES.values() for q in layout.columns} & row.keys():
+        if not isinstance(row[quantity], int | float | None) or isinstance(row[quantity], bool):
+            raise ResultError(f"{path}: {quantity} is {row[quantity]!r}; expected a number")
     return row
 
 

@@ -42,7 +42,7 @@ class Layout:
     methods: Sequence[str]
 
 
-OURS = ("ours", "ours_authors_rules", "ours_drawn", "ours_fitted")  # one network, four ways to sample
+OURS = ("ours", "ours_fitted", "ours_authors_rules", "ours_drawn")  # one network, four ways to sample
 _TOLD = (*OURS, "ground_truth")
 TABLES = {
     2: Layout(
@@ -86,9 +86,9 @@ TABLES = {
     ),
 }
 NAMES = METHODS | {
+    "ours_fitted": "Ours, fitted",
     "ours_authors_rules": "Ours, their rules",
     "ours_drawn": "… choices drawn",
-    "ours_fitted": "… codes fitted",
     "interpolation": "Interpolation",
 }
 CATEGORIES = tuple(PAPER)
@@ -250,15 +250,14 @@ def dots_figure(rows: Rows, panels: Mapping[str, str] = PANELS) -> Figure:
 def _panel(ax, rows: Rows, quantity: str, title: str) -> None:
     """One quantity: methods of the table that has it from top to bottom, categories a little apart."""
     source = next(layout for layout in TABLES.values() if quantity in layout.columns)
-    shown = [m for m in source.methods if any(papers(c, m, quantity) is not None for c in CATEGORIES)]
+    pairs = {
+        m: [(papers(c, m, quantity), ours(rows, c, m, quantity)) for c in CATEGORIES] for m in source.methods
+    }
+    shown = [method for method, found in pairs.items() if any(pair != (None, None) for pair in found)]
     for line, method in enumerate(shown):
-        for shift, category in zip((-0.22, 0, 0.22), CATEGORIES, strict=True):
+        for shift, category, (paper, here) in zip((-0.22, 0, 0.22), CATEGORIES, pairs[method], strict=True):
             style = {"marker": _MARKS[category], "color": _COLORS[category], "markersize": 5, "zorder": 3}
-            paper, here, at = (
-                papers(category, method, quantity),
-                ours(rows, category, method, quantity),
-                line + shift,
-            )
+            at = line + shift
             if paper is not None and here is not None:
                 ax.plot([paper, here], [at, at], color=_COLORS[category], linewidth=1, zorder=2)
             if paper is not None:

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from data_scripts import measure_program_vae
-from data_scripts.measure_program_vae import ABLATIONS, LEAST, LOOSE, METHODS, WRITTEN
+from data_scripts.measure_program_vae import ABLATIONS, FITTED, LEAST, METHODS, WRITTEN
 from lib.models import writing
 from lib.models.pretrained import pretrained
 from lib.models.program_vae import ProgramVAE, ProgramVAEConfig
@@ -64,7 +64,8 @@ def test_a_row(method, tmp_path, capsys):
     check(row)
     if method in WRITTEN:
         assert row["rules"]["mode"] == ("skip" if method == "no_reject" else "reject")
-        assert (row["rules"]["outside"] > 0.1) == (method in LOOSE)  # 0.1 is the paper's
+        assert (row["rules"]["outside"] > 0.1) == (method == "ours_authors_rules")  # 0.1 is the paper's
+        assert row["rules"]["fitted_codes"] == (method in FITTED) == (row["rules"]["spread"] < 1)
     if method not in ABLATIONS:  # what is written is what the tables read
         assert (
             "python" not in not_measured(load_rows(out.parent), ["chair"]).partition(NAMES[method] + " ")[1]

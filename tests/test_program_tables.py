@@ -129,7 +129,7 @@ def test_nothing_measured(tmp_path):
     rows = load_rows(tmp_path / "nowhere")
     assert provenance(rows) == "no row has been measured yet"
     told = not_measured(rows)
-    assert len(told.splitlines()) == 1 + 3 * 12
+    assert len(told.splitlines()) == 1 + 3 * 11
     assert "measure_program_vae table\n" in told and "storage --method interpolation" in told
     assert "chair --method flat --weights runs/chair-flat/program_vae.safetensors" in told
     assert "prnn" not in told.lower() and "structurenet" not in told.lower()
@@ -139,7 +139,7 @@ def test_what_was_measured_is_told(folder):
     rows = load_rows(folder)
     told = not_measured(rows)
     assert "chair --method ground_truth" not in told and "chair --method interpolation" not in told
-    assert len(told.splitlines()) == 1 + 3 * 12 - 3
+    assert len(told.splitlines()) == 1 + 3 * 11 - 3
     facts = line_of(provenance(rows), "chair    Ours")
     assert facts == ["12", "3", "real", "2020-01-01", "abc1234", "c0de", "we1947", "21.3%"]
     everything = {

@@ -42,7 +42,7 @@ class Layout:
     methods: Sequence[str]
 
 
-OURS = ("ours", "ours_fitted", "ours_authors_rules", "ours_drawn")  # one network, four ways to sample
+OURS = ("ours", "ours_fitted", "ours_authors_rules")  # one network, three ways to sample
 _TOLD = (*OURS, "ground_truth")
 TABLES = {
     2: Layout(
@@ -88,7 +88,6 @@ TABLES = {
 NAMES = METHODS | {
     "ours_fitted": "Ours, fitted",
     "ours_authors_rules": "Ours, their rules",
-    "ours_drawn": "… choices drawn",
     "interpolation": "Interpolation",
 }
 CATEGORIES = tuple(PAPER)

@@ -96,7 +96,7 @@ def extract_all(options: argparse.Namespace) -> tuple[list[dict], int]:
     if not found:
         raise DataError(f"there are no .json files in {options.input}")
     journal = open_journal(options, found)
-    chunks = unfinished(found, journal)
+    chunks = journal.unfinished(found, CHUNK)
     count = sum(map(len, chunks))
     with tqdm(desc="extracting", unit=" shapes", total=len(found), initial=len(found) - count) as bar:
         for rows in extract_chunks(chunks, options):
@@ -116,13 +116,6 @@ def open_journal(options: argparse.Namespace, found: dict[str, str]) -> Journal:
     journal.check(found)
     keep_programs(options.out, journal.rows.values())  # the kill may have come between the journal and these
     return journal
-
-
-def unfinished(found: dict[str, str], journal: Journal) -> list[dict[str, str]]:
-    """Chunks, name -> fingerprint, of which a file is missing in the journal; they are cut as in the first run."""
-    names = list(found)
-    chunks = [{name: found[name] for name in names[k : k + CHUNK]} for k in range(0, len(names), CHUNK)]
-    return [chunk for chunk in chunks if not journal.rows.keys() >= chunk.keys()]
 
 
 def extract_chunks(chunks: list[dict[str, str]], options: argparse.Namespace) -> Iterator[list[dict]]:

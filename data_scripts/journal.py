@@ -45,6 +45,12 @@ class Journal:
                 was = f"was {row['source']}, is {sources[name]}"
                 raise DataError(f"{name} has changed since {self.path} was begun ({was}); {_ADVICE}")
 
+    def unfinished(self, sources: dict[str, str], size: int) -> list[dict[str, str]]:
+        """Chunks of `size` sources of which one has no row yet; they are cut as in the first run."""
+        names = list(sources)
+        chunks = [{name: sources[name] for name in names[k : k + size]} for k in range(0, len(names), size)]
+        return [chunk for chunk in chunks if not self.rows.keys() >= chunk.keys()]
+
     def finish(self) -> None:
         """Bring the rows into the order of their names, so that the file is the same whoever finished first."""
         self.rows = dict(sorted(self.rows.items()))

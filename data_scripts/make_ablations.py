@@ -78,9 +78,7 @@ def make(folder: Path, ablation: str, category: str, texts: Texts, workers: int)
     """Rewrite a category for an ablation; returns what its summary says. `folder` is the ablation's."""
     journal = Journal(folder / f"{category}.jsonl", {"code": code_digest(*CODE)})
     journal.check({name: fingerprint(text) for name, text in texts.items()})
-    names = list(texts)
-    chunks = [{name: texts[name] for name in names[k : k + CHUNK]} for k in range(0, len(names), CHUNK)]
-    missing = [chunk for chunk in chunks if not journal.rows.keys() >= chunk.keys()]
+    missing = journal.unfinished(texts, CHUNK)
     count = sum(map(len, missing))
     jobs = ((ablation, category, chunk) for chunk in missing)
     label = f"{ablation} {category}"

@@ -52,8 +52,8 @@ from lib.training.realism import percent_fooled
 
 FOLDER = REPOSITORY / "results" / "program_vae"
 ABLATIONS = ("flat", "no_order", "no_align", "no_macros")
-# Methods whose codes are drawn from a fitted distribution. The ablations too: of the flat network's codes, nine of ten
-# from the standard normal distribution give no program.
+# Methods whose codes are drawn from a fitted distribution. The ablations too: the codes of flat chairs lie so far from
+# the standard normal distribution that what is drawn from there has a Fréchet distance of 871, and of 18 fitted.
 FITTED = ("ours_fitted", *ABLATIONS)
 WRITTEN = ("ours", "ours_authors_rules", "no_reject", *FITTED)
 METHODS = (*WRITTEN, "ground_truth", "validation", "interpolation")

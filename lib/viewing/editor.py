@@ -5,8 +5,6 @@ text moves the sliders. A text that is no program shows its error, with line and
 Everything a reader can do with the mouse is also a method, and that is how it is tested.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from html import escape
 from itertools import groupby
 
@@ -14,6 +12,7 @@ import ipywidgets as widgets
 from matplotlib.figure import Figure
 
 from lib.interpreters.shapeassembly import Program, ProgramError, execute, parse
+from lib.viewing.echo import Echo
 from lib.viewing.naming import Knob, knobs, write_number
 from lib.viewing.scene import ShapeView
 
@@ -53,7 +52,7 @@ class ProgramEditor(widgets.VBox):
         text = program if isinstance(program, str) else program.to_text()
         self.program, self.error = parse(text), None
         self.shape = execute(self.program)
-        self._ours = False  # are we the ones who move the text or a slider now?
+        self._echo = Echo()  # are we the ones who move the text or a slider now?
         self._view = ShapeView(self.shape, height=height)
         self._text = widgets.Textarea(text, layout={"width": "98%", "height": f"{height}px"})
         self._error = widgets.HTML()
@@ -80,7 +79,7 @@ class ProgramEditor(widgets.VBox):
 
     def set_text(self, text: str) -> None:
         """Replace the program's text. A text that is no program sets `error`; program and shape stay as they were."""
-        with self._we_move():
+        with self._echo:
             self._text.value = text
         self._read(text)
 
@@ -123,7 +122,7 @@ class ProgramEditor(widgets.VBox):
                 slider.disabled = self._waiting
 
     def _move_sliders(self) -> None:
-        with self._we_move():
+        with self._echo:
             for slider, value in zip(self._sliders.values(), self.program.parameters().tolist(), strict=True):
                 if abs(slider.value - value) > SNAP:
                     slider.min, slider.max = min(slider.min, value), max(slider.max, value)
@@ -153,22 +152,13 @@ class ProgramEditor(widgets.VBox):
         return slider
 
     def _on_text(self, change) -> None:
-        if not self._ours:
+        if not self._echo:
             self._read(change["new"])
 
     def _on_slider(self, name: str, value: float) -> None:
         present = dict(zip(self._sliders, self.program.parameters().tolist(), strict=True))[name]
-        if not self._ours and not self.error and abs(value - present) > SNAP:
+        if not self._echo and not self.error and abs(value - present) > SNAP:
             self.set_parameter(name, value)
-
-    @contextmanager
-    def _we_move(self) -> Iterator[None]:
-        """Inside, changes of the text and the sliders are our own echo, not the reader's wish."""
-        before, self._ours = self._ours, True
-        try:
-            yield
-        finally:
-            self._ours = before
 
     def _arrange(self) -> list[widgets.Widget]:
         saves = {

@@ -9,8 +9,7 @@ code anew, and both shape and text follow. Sliders are used with the mouse or, o
 the arrow keys. On a page without a kernel a live view is blank: put `explorer.figure()` above it.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from html import escape
 
 import ipywidgets as widgets
@@ -23,6 +22,7 @@ from lib.interpreters.shapeassembly import Program, Shape, execute
 from lib.models.exploring import Directions, codes
 from lib.models.program_vae import ProgramVAE
 from lib.models.writing import write
+from lib.viewing.echo import Echo
 from lib.viewing.latent_figures import direction_figure, line_count
 from lib.viewing.scene import ShapeView
 
@@ -57,7 +57,7 @@ class LatentExplorer(widgets.VBox):
         self.network, self.directions = network, directions
         self.program: Program | None = None
         self.shape: Shape | None = None
-        self._ours = False  # are we the ones who move the sliders now?
+        self._echo = Echo()  # are we the ones who move the sliders now?
         self._height = height
         self._noise = torch.Generator().manual_seed(0)
         self._view = ShapeView(height=height)
@@ -109,7 +109,7 @@ class LatentExplorer(widgets.VBox):
             raise ValueError(
                 f"found weights {weights}; expected {len(self._sliders)} from {-REACH:g} to {REACH:g}"
             )
-        with self._we_move():
+        with self._echo:
             for slider, weight in zip(self._sliders, weights):
                 slider.value = weight
         self._follow()
@@ -186,17 +186,8 @@ class LatentExplorer(widgets.VBox):
         return slider
 
     def _on_slider(self, _) -> None:
-        if not self._ours:
+        if not self._echo:
             self._follow()
-
-    @contextmanager
-    def _we_move(self) -> Iterator[None]:
-        """Inside, changes of the sliders are our own, and the network writes once for all of them."""
-        before, self._ours = self._ours, True
-        try:
-            yield
-        finally:
-            self._ours = before
 
     def _arrange(self) -> list[widgets.Widget]:
         buttons = [

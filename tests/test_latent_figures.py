@@ -74,7 +74,7 @@ def test_the_two_neighbours_can_differ():
 def test_three_rows_of_neighbours(pieces):
     figure = neighbour_figure(pieces[:2], pieces, size=0.5)
     assert len(figure.axes) == 6 and labels(figure)[-2:] == ["0 edits", "0 edits"]
-    assert [text.get_text() for ax in figure.axes for text in ax.texts] == [
+    assert [text.get_text() for text in figure.texts] == [
         "nearest by geometry", "written by the network", "nearest by program",
     ]  # fmt: skip
 

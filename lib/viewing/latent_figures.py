@@ -90,7 +90,7 @@ def neighbour_figure(
         *(f"{edits} edit{'s' if edits != 1 else ''}" for edits in found.edits.tolist()),
     ]
     figure = show(shapes, titles, columns=len(programs), size=size, **options)
-    return _with_row_names(figure, ROW_NAMES)
+    return with_row_names(figure, ROW_NAMES)
 
 
 def variant_figure(
@@ -150,12 +150,14 @@ def shapes_of(programs: Sequence[Program | None]) -> list[Shape | None]:
     return [None if program is None else next(shapes) for program in programs]
 
 
-def _with_row_names(figure: Figure, names: Sequence[str]) -> Figure:
+def with_row_names(figure: Figure, names: Sequence[str]) -> Figure:
     """A name left of each row of pictures, which make room for it."""
-    columns, margin = len(figure.axes) // len(names), NAME_WIDTH / figure.get_figwidth()
-    for ax in figure.axes:
+    columns, before = len(figure.axes) // len(names), figure.get_figwidth()
+    figure.set_figwidth(before + NAME_WIDTH)
+    shrunk, margin = before / (before + NAME_WIDTH), NAME_WIDTH / (before + NAME_WIDTH)
+    for ax in figure.axes:  # each as large as it was
         left, bottom, width, height = ax.get_position().bounds
-        ax.set_position([margin + (1 - margin) * left, bottom, (1 - margin) * width, height])
+        ax.set_position([margin + shrunk * left, bottom, shrunk * width, height])
     for row, name in enumerate(names):
         box = figure.axes[row * columns].get_position()
         middle = (box.y0 + box.y1) / 2

@@ -37,7 +37,7 @@ def lines_figure(block: Block, width: float = 11.0) -> Figure:
     for where in FIELD.values():
         ax.axvline(where.start - 0.5, color="#aab2c0", linewidth=0.8)
     middles = [(where.start + where.stop - 1) / 2 for where in FIELD.values()]
-    ax.set_xticks(middles, FIELD, rotation=60, ha="left", rotation_mode="anchor", fontsize=8)
+    ax.set_xticks(middles, FIELD, rotation=90, fontsize=7)
     ax.xaxis.tick_top()
     ax.set_xlim(-0.5, WIDTH - 0.5)
     ax.tick_params(length=0)

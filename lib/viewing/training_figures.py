@@ -19,7 +19,7 @@ from torch import Tensor
 
 from lib.interpreters.shapeassembly import Program
 from lib.viewing.figure import show
-from lib.viewing.latent_figures import line_count, shapes_of
+from lib.viewing.latent_figures import line_count, shapes_of, with_row_names
 
 COLORS = ("#9aa5b8", "#e28f4f", "#5e8bba", "#70ad77")
 SMALLEST = 0.01  # what a logarithmic axis of costs begins with
@@ -67,16 +67,12 @@ def curves_figure(log: Sequence[Mapping[str, float]], weights: Mapping[str, floa
     return figure
 
 
-def progress_figure(rows: Mapping[str, Sequence[Program | None]], size: float = 1.3) -> Figure:
-    """A row of programs for each name, which stands over it; an empty picture for None. Rows are equally long."""
+def progress_figure(rows: Mapping[str, Sequence[Program | None]], size: float = 1.15) -> Figure:
+    """A row of programs for each name, which stands left of it; an empty picture for None. Rows are equally long."""
     programs = [program for row in rows.values() for program in row]
     titles = [f"{line_count(program)} lines" if program else "none" for program in programs]
     columns = len(programs) // len(rows)
-    figure = show(shapes_of(programs), titles, columns=columns, size=size)
-    for number, name in enumerate(rows):
-        ax = figure.axes[number * columns]
-        ax.text(0.03, 1.0, name, transform=ax.transAxes, va="top", fontsize=9, weight="bold", color="#3b4252")
-    return figure
+    return with_row_names(show(shapes_of(programs), titles, columns=columns, size=size), list(rows))
 
 
 def surprise_figure(

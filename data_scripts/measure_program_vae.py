@@ -10,6 +10,8 @@
     python -m data_scripts.measure_program_vae chair --method validation      the row "Validation" of Table 4
     python -m data_scripts.measure_program_vae chair --method interpolation   Table 6
 
+With --seed N, --out results/program_vae/other_seeds/N/CATEGORY_METHOD.json keeps the row beside that of seed 0.
+
 Each writes results/program_vae/CATEGORY_METHOD.json, with the seed, the number of samples, the date and the version of
 the code and of the weights. `lib.viewing.program_tables` puts the rows beside the paper's. A row takes two to three
 minutes on two cores; --quick takes 48 samples.

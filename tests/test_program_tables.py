@@ -20,6 +20,7 @@ from lib.viewing.program_tables import (
     load_rows,
     not_measured,
     ours,
+    over_seeds,
     provenance,
     table,
 )
@@ -163,6 +164,16 @@ def test_a_file_that_is_no_result(content, said, tmp_path):
     with pytest.raises(ResultError, match=re.escape(said)) as told:
         load_rows(tmp_path)
     assert "table_ours.json" in str(told.value)
+
+
+def test_seeds_stand_side_by_side(folder):
+    first, other = load_rows(folder), {"chair": {"ours": {"seed": 7, "rooted": 50.0, "stable": 44.0}}}
+    told = over_seeds([first, other], "ours")
+    assert line_of(told, "Ours") == "paper seed 3 seed 7".split()
+    assert line_of(told, "chair    % rooted") == "94.5 91.2 50.0".split()
+    assert line_of(told, "chair    ÷ real") == "0.963 0.750 0.500".split()  # by the real shapes of the first
+    assert line_of(told, "storage  % novel") == "53 - -".split()
+    assert "seed -" in over_seeds([{}, {}])
 
 
 def test_the_figure_shows_both(folder):

@@ -5,6 +5,7 @@
     print(not_measured(rows))             and which command measures it
     print(provenance(rows))               seeds, sample counts, dates, versions
     dots_figure(rows)
+    print(over_seeds([rows, *others]))    a row by several seeds; the others: RESULTS / "other_seeds"
 
 `data_scripts.measure_program_vae` writes the files. Every row of the paper is named, whether or not it was measured.
 The other methods, 3D-PRNN and StructureNet, are the paper's measurements; they are not built here.
@@ -166,6 +167,31 @@ def _width(heading: str, form: str) -> int:
 
 def _cell(value: float | None, form: str) -> str:
     return "-" if value is None else format(value, form)
+
+
+JUDGED = ("rooted", "stable_of_real", "coverage", "variety", "lines", "novel_percent")
+
+
+def over_seeds(runs: Sequence[Rows], method: str = "ours_fitted") -> str:
+    """A line for each category and quantity: the paper's number for its method, then ours from each run.
+
+    Only the first run has to have the rows of the real shapes.
+    """
+    columns = {quantity: column for layout in TABLES.values() for quantity, column in layout.columns.items()}
+    seeds = [next((row["seed"] for row in _rows_of(run, method)), "-") for run in runs]
+    lines = [f"{NAMES[method]:28s}{'paper':>8s}" + "".join(f"{f'seed {seed}':>8s}" for seed in seeds)]
+    for category in CATEGORIES:
+        real = {"ground_truth": runs[0].get(category, {}).get("ground_truth", {})}
+        for quantity in JUDGED:
+            heading, form = columns[quantity]
+            found = [_number(run.get(category, {}) | real, method, quantity) for run in runs]
+            cells = [_cell(value, form) for value in (papers(category, "ours", quantity), *found)]
+            lines.append(f"{category:9s}{heading:19s}" + "".join(f"{cell:>8s}" for cell in cells))
+    return "\n".join(lines)
+
+
+def _rows_of(rows: Rows, method: str) -> list[Mapping]:
+    return [methods[method] for methods in rows.values() if method in methods]
 
 
 def not_measured(rows: Rows, categories: Sequence[str] = CATEGORIES) -> str:

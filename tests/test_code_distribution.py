@@ -7,8 +7,8 @@ from lib.datasets import CATEGORIES, shapeassembly
 from lib.models.code_distribution import CodeDistribution
 from lib.models.exploring import codes
 from lib.models.pretrained import pretrained
-from lib.models.program_vae import ProgramVAE
-from lib.models.weights import CheckpointError, load
+from lib.models.program_vae import ProgramVAE, ProgramVAEConfig
+from lib.models.weights import CheckpointError, load, write
 from lib.models.writing import sample
 
 pytestmark = pytest.mark.usefixtures("unchecked_shapes")
@@ -49,6 +49,20 @@ def test_it_comes_back_from_its_file(fitted, tmp_path):
     assert torch.equal(again.mean, fitted.mean) and torch.equal(again.factor, fitted.factor)
     with pytest.raises(CheckpointError, match="kind"):
         CodeDistribution.load(pretrained("program_vae_chair"))
+    write(
+        tmp_path / "flat.safetensors",
+        {"mean": torch.zeros(4), "factor": torch.zeros(4)},
+        "CodeDistribution",
+        {},
+    )
+    with pytest.raises(CheckpointError, match=r"found arrays .*; expected mean \(n,\) and factor \(n, n\)"):
+        CodeDistribution.load(tmp_path / "flat.safetensors")
+
+
+def test_codes_of_another_length_are_refused(fitted):
+    small = ProgramVAE(ProgramVAEConfig(hidden=8, head=8))
+    with pytest.raises(ValueError, match="codes of 256 numbers; expected 8"):
+        sample(small, 1, codes=fitted)
 
 
 @pytest.mark.parametrize("category", CATEGORIES)

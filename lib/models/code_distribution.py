@@ -17,7 +17,7 @@ from torch import Tensor
 from ..interpreters.shapeassembly import Program
 from .program_table import ProgramTable, batch_of
 from .program_vae import Posterior, ProgramVAE
-from .weights import read, write
+from .weights import CheckpointError, read, write
 
 AT_ONCE = 256  # programs: bounds the memory
 
@@ -70,4 +70,8 @@ class CodeDistribution:
     def load(cls, path: Path) -> "CodeDistribution":
         """What `save` wrote. Raises CheckpointError for anything else."""
         tensors, _ = read(path, cls.__name__)
+        found = {name: tuple(tensor.shape) for name, tensor in tensors.items()}
+        latent = tensors["mean"].numel() if "mean" in tensors else 0
+        if found != {"mean": (latent,), "factor": (latent, latent)}:
+            raise CheckpointError(f"{path}: found arrays {found}; expected mean (n,) and factor (n, n)")
         return cls(**tensors)

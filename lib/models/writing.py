@@ -110,10 +110,14 @@ def sample(
     temperature  of the choices, see `write`; all chance comes from `seed`
     codes        what codes are drawn from; default: the standard normal distribution, as in the paper
     The first programs are the same for every `count`. Raises RuntimeError where hardly any code gives a program, and
-    ValueError for a count or a spread below 0.
+    ValueError for a count or a spread below 0, and for codes of another length than the network's.
     """
     if count < 0 or not 0 <= spread < math.inf:
         raise ValueError(f"a count of {count}, a spread of {spread}; expected 0 or more, both finite")
+    if codes is not None and len(codes.mean) != network.config.hidden:
+        raise ValueError(
+            f"codes of {len(codes.mean)} numbers; expected {network.config.hidden}, as the network has"
+        )
     noise = torch.Generator().manual_seed(seed)
     network = _on_cpu(network)
     programs: list[Program] = []

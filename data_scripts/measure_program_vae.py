@@ -10,6 +10,9 @@
     python -m data_scripts.measure_program_vae chair --method validation      the row "Validation" of Table 4
     python -m data_scripts.measure_program_vae chair --method interpolation   Table 6
 
+The ablations of chairs were trained like the chairs themselves: `python -m lib.training program_vae --category chair
+--ablation flat --epochs 120 --kl 0.05 --out runs/chair-flat`, after `python -m data_scripts.make_ablations`.
+
 With --seed N, --out results/program_vae/other_seeds/N/CATEGORY_METHOD.json keeps the row beside that of seed 0.
 
 Each writes results/program_vae/CATEGORY_METHOD.json, with the seed, the number of samples, the date and the version of

@@ -89,9 +89,8 @@ def _ground(height: float) -> mujoco.MjSpec:
     spec.option.gravity = [0, -GRAVITY, 0]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC  # friction equally strong in every direction
-    spec.compiler.balanceinertia = (
-        True  # of a box of 1e6 by 1e-6, rounding leaves inertias that no body can have
-    )
+    # Of a box of 1e6 by 1e-6, rounding leaves inertias that no body can have.
+    spec.compiler.balanceinertia = True
     spec.option.impratio = 10  # and stiff: what stands on a slant does not creep
     plane = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], quat=UP_IS_Y)
     plane.pos = [0, height, 0]

@@ -1,0 +1,117 @@
+"""What CSGNet learns with a teacher: the programs of pictures that were drawn from random programs (paper, eq. 1).
+
+Pictures are drawn while it learns, a batch at a time, so that a data set is a list of tokens. An epoch is a number of
+programs drawn from that list, by chance and with repetitions. The log says what share of its time went into drawing.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor, nn
+
+from ..datasets.csg import TokenSet
+from ..interpreters.csg import execute_many
+from ..metrics.images import image_chamfer, iou
+from ..models.csgnet import CSGNet
+from ..models.csgnet_decoding import write
+
+PER_REPORT = 100  # programs at once when other data is scored
+
+
+class Teacher(nn.Module):
+    """The network and what it is asked to do, as one module: pictures and their programs -> the loss."""
+
+    def __init__(self, network: CSGNet):
+        super().__init__()
+        self.network = network
+
+    def forward(
+        self, canvases: Bool[Tensor, "rows *canvas"], tokens: Int[Tensor, "rows steps"]
+    ) -> Float[Tensor, ""]:
+        """Mean negative logarithm of the probability of a token, over all tokens up to each program's `$`."""
+        stop = self.network.stop
+        ended = (tokens == stop).cumsum(1) - (tokens == stop).long() > 0  # after the first `$`
+        scores = self.network(canvases, tokens).float()
+        return nn.functional.cross_entropy(scores[~ended], tokens[~ended])
+
+
+@dataclass
+class ParseTask:
+    """Learn programs of `train`; those of `other` are scored after every epoch. A `Task` for `lib.training.loop.fit`.
+
+    per_epoch   programs an epoch
+    curriculum  share of all steps in which the longest programs that are shown grow from the shortest to all of them
+    about       JSON: data and settings that must be the same when a run goes on
+    """
+
+    module: Teacher
+    train: TokenSet
+    other: TokenSet
+    per_epoch: int
+    curriculum: float
+    about: dict
+    drawing: float = field(default=0.0, init=False)  # seconds since the last report
+    started: float = field(default_factory=time.perf_counter, init=False)
+
+    def __post_init__(self) -> None:
+        stop = self.train.vocabulary.stop
+        self._lengths = (self.train.tokens != stop).sum(1)  # sorted: shorter programs come first
+
+    @property
+    def network(self) -> nn.Module:
+        return self.module
+
+    def __len__(self) -> int:
+        return self.per_epoch
+
+    def loss(
+        self, network: nn.Module, picks: Sequence[int], noise: torch.Generator, progress: float
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Loss of as many random programs as there are picks."""
+        tokens = self.train.tokens[torch.randint(self.shown(progress), (len(picks),), generator=noise)]
+        tokens = tokens[:, : int((tokens != self.train.vocabulary.stop).sum(1).max()) + 1]
+        start = time.perf_counter()
+        device = next(network.parameters()).device
+        canvases = drawn(tokens, self.train, device)
+        self.drawing += time.perf_counter() - start
+        return network(canvases, tokens.to(device)), {}
+
+    def shown(self, progress: float) -> int:
+        """How many of the programs, the shortest first, are drawn from when a share `progress` of all steps is done."""
+        if progress >= self.curriculum:
+            return len(self.train)
+        lengths = self._lengths.unique()
+        longest = lengths[int(progress / self.curriculum * len(lengths))]
+        return int((self._lengths <= longest).sum())
+
+    @torch.no_grad()
+    def report(self, network: nn.Module) -> dict[str, float]:
+        """Share of drawing in the time since the last report; of the other programs the loss, and how alike the shape
+        that the network writes (greedy) is to the one it sees: Chamfer distance, px, or in space IoU, both means."""
+        seconds = time.perf_counter() - self.started
+        found = {"drawing_share": min(1.0, self.drawing / seconds)}
+        device = next(network.parameters()).device
+        sums = {"val_loss": 0.0, "val_cd" if self.other.vocabulary.dimensions == 2 else "val_iou": 0.0}
+        likeness = list(sums)[1]
+        for start in range(0, len(self.other), PER_REPORT):
+            tokens = self.other.tokens[start : start + PER_REPORT]
+            canvases = drawn(tokens, self.other, device)
+            sums["val_loss"] += network(canvases, tokens.to(device)).item() * len(tokens)
+            answers = drawn(write(self.module.network, canvases).tokens, self.other, device)
+            score = (
+                image_chamfer(canvases, answers) if likeness == "val_cd" else iou(canvases, answers, dims=3)
+            )
+            sums[likeness] += score.sum().item()
+        self.drawing, self.started = 0.0, time.perf_counter()
+        return found | {name: value / len(self.other) for name, value in sums.items()}
+
+
+def drawn(
+    tokens: Int[Tensor, "rows length"], programs: TokenSet, device: torch.device
+) -> Bool[Tensor, "rows *canvas"]:
+    """What programs draw: images or grids."""
+    shapes = execute_many(tokens, programs.vocabulary, device=device)
+    return shapes.images if shapes.dimensions == 2 else shapes.grids

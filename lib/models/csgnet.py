@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 SIDE = 64  # pixels or voxels along each side of a canvas
+NORMS = ("none", "batch", "group")
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class CSGNetConfig:
     tokens      of the vocabulary, `$` included
     channels    of each convolution, the first one's first; after it comes ReLU
     kernels     their widths; strides: how far they move; pools: how many outputs along each side become one, by maximum
-    batch_norm  after each convolution and pooling
+    norm        what comes after each convolution and pooling: "none", "batch" (paper, in space), or "group", which scales
+                each shape by its own mean and spread, so that others of its batch do not matter
     embedding, hidden   widths of what stands for a token, and of the GRU
     dropout     share of the values that are dropped in training: after convolutions, GRU and linear layer
     Raises ValueError for lists of different lengths, sizes below 1, and canvases that do not divide.
@@ -39,7 +41,7 @@ class CSGNetConfig:
     kernels: tuple[int, ...] = (3, 3, 3)
     strides: tuple[int, ...] = (1, 1, 1)
     pools: tuple[int, ...] = (2, 2, 2)
-    batch_norm: bool = False
+    norm: str = "none"
     embedding: int = 128
     hidden: int = 2048
     dropout: float = 0.2
@@ -52,6 +54,8 @@ class CSGNetConfig:
             raise ValueError(f"found {self}; expected sizes of at least 1, and 4 tokens")
         if any(kernel < stride or (kernel - stride) % 2 and stride > 1 for kernel, stride in self.windows):
             raise ValueError(f"found {self}; expected kernels as wide as strides, or wider by an even number")
+        if self.norm not in NORMS:
+            raise ValueError(f"found the norm {self.norm!r}; expected one of {', '.join(NORMS)}")
         if not 0 <= self.dropout < 1:
             raise ValueError(f"found a dropout of {self.dropout}; expected a share below 1")
         _ = self.feature
@@ -77,16 +81,16 @@ class CSGNetConfig:
         if dimensions == 2:
             return cls()
         channels, ones, twos = (32, 64, 128, 256, 256), (1,) * 5, (2,) * 5
-        return cls(3, 6635, channels, (4, 4, 3, 3, 3), ones, twos, True, hidden=1500)
+        return cls(3, 6635, channels, (4, 4, 3, 3, 3), ones, twos, "batch", hidden=1500)
 
     @classmethod
     def compact(cls, dimensions: int = 2) -> Self:
         """Sizes that train on two cores: convolutions that stride instead of pooling, and a smaller GRU."""
         if dimensions == 2:
             channels, kernels, strides = (16, 32, 64, 64, 16), (4, 4, 4, 3, 1), (2, 2, 2, 1, 1)
-            return cls(2, 400, channels, kernels, strides, (1,) * 5, True, 64, 512, 0.0)
+            return cls(2, 400, channels, kernels, strides, (1,) * 5, "batch", 64, 512, 0.0)
         channels, kernels, strides = (32, 48, 64, 96, 16), (4, 4, 3, 2, 1), (4, 2, 1, 2, 1)
-        return cls(3, 6635, channels, kernels, strides, (1,) * 5, True, 32, 224, 0.0)
+        return cls(3, 6635, channels, kernels, strides, (1,) * 5, "group", 32, 224, 0.0)
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,7 @@ class CSGNet(nn.Module):
     def advance(
         self, state: State, before: Int[Tensor, "rows steps"]
     ) -> tuple[Float[Tensor, "rows steps tokens"], State]:
-        """Scores (logits) of what comes after each of some tokens, given all before it, and the state after the last."""
+        """Scores (logits) of what comes after each of some tokens, and the state after the last."""
         weight = self.gru.weight_ih[:, self.config.feature :]
         # A token's share of the gates: computed for each token of the vocabulary, or for each that is given, whichever
         # are fewer.
@@ -173,11 +177,12 @@ class CSGNet(nn.Module):
 
 
 def _encoder(config: CSGNetConfig) -> nn.Sequential:
-    """Convolution, ReLU, pooling, dropout and batch norm, as often as there are channels."""
+    """Convolution, ReLU, pooling, dropout and norm, as often as there are channels."""
     plane = config.dimensions == 2
-    convolution, pooling, norm = (
+    convolution, pooling, batch_norm = (
         (nn.Conv2d, nn.MaxPool2d, nn.BatchNorm2d) if plane else (nn.Conv3d, nn.MaxPool3d, nn.BatchNorm3d)
     )
+    norms = {"none": nn.Identity, "batch": batch_norm, "group": lambda channels: nn.GroupNorm(1, channels)}
     layers: list[nn.Module] = []
     inner = 1
     for channels, (kernel, stride), pool in zip(config.channels, config.windows, config.pools):
@@ -185,6 +190,6 @@ def _encoder(config: CSGNetConfig) -> nn.Sequential:
         layers += [convolution(inner, channels, kernel, stride, padding), nn.ReLU()]
         layers += [pooling(pool)] if pool > 1 else []
         layers += [nn.Dropout(config.dropout)] if config.dropout else []
-        layers += [norm(channels)] if config.batch_norm else []
+        layers += [norms[config.norm](channels)]
         inner = channels
     return nn.Sequential(*layers)

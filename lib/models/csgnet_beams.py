@@ -1,6 +1,6 @@
 """Beam search: the k likeliest programs that a CSGNet knows for each shape, or nearly so.
 
-Of each shape k beginnings are kept. In each step all are continued by all tokens, and of these the k likeliest are kept.
+Of each shape k beginnings are kept. In each step all are continued by all tokens, and the k likeliest are kept.
 A program that has ended stays as it is and competes with its probability. Probabilities are added as logarithms.
 
 Beginnings that leave the same parts on the stack, whichever operand of a union or an intersection came first, have the

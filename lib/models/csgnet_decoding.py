@@ -70,7 +70,7 @@ def log_odds(
 
 
 def _drawn(odds: Float[Tensor, "rows tokens"], noise: torch.Generator) -> Int[Tensor, " rows"]:
-    """A token a row, by its probability: the first at which the sum of all up to it reaches a random height, above 0."""
+    """A token a row: the first at which the sum of all probabilities up to it reaches a random height, above 0."""
     sums = odds.detach().exp().cumsum(1)
     height = (1 - torch.rand(len(odds), generator=noise)).to(odds)
     return torch.searchsorted(sums, (height * sums[:, -1]).unsqueeze(1)).squeeze(1)

@@ -1,4 +1,4 @@
-"""A training that was stopped, on disk: weights, Adam's moments, settings and log, by `lib.models.weights.write`.
+"""A training that was stopped, on disk: weights, optimizer's moments, settings and log, by `lib.models.weights.write`.
 
 The file is written whole under another name and then renamed: a run that is killed leaves the last checkpoint or the
 one before, never half of one.
@@ -13,12 +13,9 @@ from torch import Tensor, nn
 from ..models.weights import CheckpointError, read, write
 
 KIND = "training run"
-NETWORK, ADAM = "network", "adam"  # what the names of arrays begin with
-MOMENTS = (
-    "step",
-    "exp_avg",
-    "exp_avg_sq",
-)  # torch's names: steps taken, running means of gradient and its square
+NETWORK = "network"  # what the names of its arrays begin with; those of an optimizer begin with its name
+# What an optimizer keeps for each weight, by torch's names: Adam the steps taken, running means of gradient and square.
+MOMENTS = {"adam": ("step", "exp_avg", "exp_avg_sq"), "sgd": ("momentum_buffer",)}
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ def write_checkpoint(
     tensors = {f"{NETWORK}.{name}": value for name, value in network.state_dict().items()}
     for name, weight in network.named_parameters():
         for moment, value in optimizer.state.get(weight, {}).items():
-            tensors[f"{ADAM}.{moment}.{name}"] = value
+            tensors[f"{_kind(optimizer)}.{moment}.{name}"] = value
     write(path, tensors, KIND, {"about": checkpoint.about, "log": checkpoint.log})
 
 
@@ -52,19 +49,24 @@ def read_checkpoint(
         tensors, facts = read(path, KIND)
         checkpoint = _told(path, facts)
         _same_run(path, checkpoint.about, about)
-        _check(path, tensors, _expected(network, tensors))
+        _check(path, tensors, _expected(network, _kind(optimizer), tensors))
     except CheckpointError as error:
         raise CheckpointError(f"{error}. Choose another folder, or remove the file to begin anew") from error
     state = network.state_dict()
     network.load_state_dict({name: tensors[f"{NETWORK}.{name}"] for name in state})
+    kind = _kind(optimizer)
     for name, weight in network.named_parameters():
-        if f"{ADAM}.step.{name}" in tensors:  # else it has not been used yet
-            kept = {moment: tensors[f"{ADAM}.{moment}.{name}"] for moment in MOMENTS}
+        if f"{kind}.{MOMENTS[kind][0]}.{name}" in tensors:  # else it has not been used yet
+            kept = {moment: tensors[f"{kind}.{moment}.{name}"] for moment in MOMENTS[kind]}
             # Adam keeps its step counts on the CPU, wherever the weights are.
             optimizer.state[weight] = {
                 moment: value if moment == "step" else value.to(weight) for moment, value in kept.items()
             }
     return checkpoint
+
+
+def _kind(optimizer: torch.optim.Optimizer) -> str:
+    return type(optimizer).__name__.lower()
 
 
 def _told(path: Path, facts: dict) -> Checkpoint:
@@ -84,11 +86,11 @@ def _same_run(path: Path, was: dict, now: dict) -> None:
         raise CheckpointError(f"{path}: belongs to another run ({changes})")
 
 
-def _expected(network: nn.Module, found: dict[str, Tensor]) -> dict[str, Tensor]:
+def _expected(network: nn.Module, kind: str, found: dict[str, Tensor]) -> dict[str, Tensor]:
     """What the arrays should be like: weights, and all moments of each weight that has one."""
     expected = {f"{NETWORK}.{name}": value for name, value in network.state_dict().items()}
     for name, weight in network.named_parameters():
-        names = {moment: f"{ADAM}.{moment}.{name}" for moment in MOMENTS}
+        names = {moment: f"{kind}.{moment}.{name}" for moment in MOMENTS[kind]}
         if any(each in found for each in names.values()):
             expected |= {
                 each: torch.zeros(()) if moment == "step" else weight for moment, each in names.items()

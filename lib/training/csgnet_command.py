@@ -42,7 +42,8 @@ def job(options: argparse.Namespace) -> Job:
     """CSGNet on the training programs; some of validation are scored after every epoch."""
     if not 0 <= options.curriculum <= 1 or options.programs < 1:
         raise TrainingError(
-            f"curriculum is {options.curriculum}, programs {options.programs}; expected a share from 0 to 1, and 1 or more"
+            f"curriculum is {options.curriculum}, programs {options.programs}; "
+            "expected a share from 0 to 1, and 1 or more"
         )
     names = ("epochs", "batch", "rate", "warmup", "last", "clip", "seed")
     schedule = Schedule(**{name: getattr(options, name) for name in names})

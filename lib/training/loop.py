@@ -46,6 +46,7 @@ class Schedule:
     warmup   share of the steps in which the rate grows from 0 to that
     last     the rate at the end, as a share of the highest, reached along half a cosine; 1 keeps it constant
     clip     largest norm of the gradient; a longer one is shortened to it
+    momentum 0: Adam; else plain gradient descent, with this momentum
     seed     of everything random
 
     Raises TrainingError for numbers that make no sense.
@@ -58,6 +59,7 @@ class Schedule:
     last: float = 1.0
     clip: float = math.inf
     seed: int = 0
+    momentum: float = 0.0
 
     def __post_init__(self) -> None:
         for name, least in {"epochs": 1, "batch": 1, "seed": 0}.items():
@@ -69,7 +71,7 @@ class Schedule:
             raise TrainingError(f"rate is {self.rate}; expected a number above 0, at most {LARGEST_RATE:g}")
         if not self.clip > 0:
             raise TrainingError(f"clip is {self.clip}; expected a number above 0")
-        for name in ("warmup", "last"):
+        for name in ("warmup", "last", "momentum"):
             if not 0 <= (value := getattr(self, name)) <= 1:
                 raise TrainingError(f"{name} is {value}; expected a share from 0 to 1")
 
@@ -117,13 +119,12 @@ def fit(
     if not len(task):
         raise TrainingError("there is nothing to learn from: no training items")
     fabric = fabric or Fabric(devices=1)
-    # Plain Adam: the fused one gives other last bits on other processors.
-    adam = torch.optim.Adam(task.network.parameters(), lr=schedule.rate, eps=EPSILON)
-    network, optimizer = fabric.setup(task.network, adam)
+    descent = _optimizer(task.network, schedule)
+    network, optimizer = fabric.setup(task.network, descent)
     about = json.loads(json.dumps(task.about | asdict(schedule), default=str))
     log: list[dict] = []
     if (folder / CHECKPOINT).exists():
-        log = read_checkpoint(folder / CHECKPOINT, task.network, adam, about).log
+        log = read_checkpoint(folder / CHECKPOINT, task.network, descent, about).log
     fabric.barrier()  # nobody writes before all have read
     if fabric.is_global_zero:
         for part in folder.glob("half-*.part"):  # a run was killed while it wrote; the folder is one run's
@@ -132,7 +133,7 @@ def fit(
     for epoch in range(len(log), schedule.epochs):
         log = [*log, run.epoch(epoch, log[-1] if log else {})]
         if fabric.is_global_zero:
-            write_checkpoint(folder / CHECKPOINT, task.network, adam, Checkpoint(about, log))
+            write_checkpoint(folder / CHECKPOINT, task.network, descent, Checkpoint(about, log))
             _write_log(folder / LOG, log)
             if told:
                 told(log[-1])
@@ -140,6 +141,14 @@ def fit(
     if fabric.is_global_zero:
         _write_log(folder / LOG, log)  # again: a run may have been killed between checkpoint and log
     return log
+
+
+def _optimizer(network: nn.Module, schedule: Schedule) -> torch.optim.Optimizer:
+    weights = list(network.parameters())
+    if schedule.momentum:
+        return torch.optim.SGD(weights, lr=schedule.rate, momentum=schedule.momentum)
+    # Plain Adam: the fused one gives other last bits on other processors.
+    return torch.optim.Adam(weights, lr=schedule.rate, eps=EPSILON)
 
 
 def batches(count: int, schedule: Schedule, epoch: int) -> list[np.ndarray]:

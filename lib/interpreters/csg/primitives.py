@@ -186,9 +186,15 @@ def draw(
 ) -> Int[Tensor, "n lines"]:
     """The canvases of primitives of one dimension: 64 words each in the plane, 4,096 in space."""
     words = torch.empty((len(primitives), SIDE ** (dimensions - 1)), dtype=torch.int64, device=device)
-    for letters, kind in KINDS.items():
+    for letters in KINDS:
         rows = [i for i, primitive in enumerate(primitives) if primitive.kind == letters]
-        for some in (rows[k : k + _AT_ONCE] for k in range(0, len(rows), _AT_ONCE)):
-            numbers = torch.tensor([primitives[i].numbers for i in some], device=device)
-            words[torch.tensor(some, device=device)] = pack_runs(*kind.runs(numbers))
+        if rows:
+            numbers = torch.tensor([primitives[i].numbers for i in rows], device=device)
+            words[torch.tensor(rows, device=device)] = draw_numbers(letters, numbers)
     return words
+
+
+def draw_numbers(letters: str, numbers: Int[Tensor, "n fields"]) -> Int[Tensor, "n lines"]:
+    """The canvases of primitives of one kind, whose numbers are trusted to be in range."""
+    runs = KINDS[letters].runs
+    return torch.cat([pack_runs(*runs(some)) for some in numbers.split(_AT_ONCE)])

@@ -1,0 +1,103 @@
+"""Programs of the plane with their centers and sizes as one tensor: many variants of many programs, drawn as a batch."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Int
+from torch import Tensor
+
+from lib.interpreters.csg import Operation, Primitive, Program
+from lib.interpreters.csg.machine import run
+from lib.interpreters.csg.packing import unpack
+from lib.interpreters.csg.primitives import draw_numbers
+
+KINDS = "cst"  # circle, square, triangle
+OPERATIONS = "+*-"
+CENTERS, SIZES = (8, 56), (8, 32)  # what numbers may be: the range of the networks' vocabulary
+
+
+@dataclass(frozen=True)
+class NumberedPrograms:
+    """n programs. Their structure: tokens, kinds, below; their numbers: x, y and r of each primitive.
+
+    tokens   (n, length) -1 - p: the p-th primitive of the program; 0, 1, 2: + * -; 3: it has ended
+    kinds    (n, primitives) index into KINDS; -1 where there is none
+    below    (n, length, primitives) which primitives a place of the program is made of
+    """
+
+    tokens: Int[Tensor, "n length"]
+    kinds: Int[Tensor, "n primitives"]
+    below: Bool[Tensor, "n length primitives"]
+    numbers: Int[Tensor, "n primitives 3"]
+
+    def rows(self, which: Int[Tensor, " some"]) -> "NumberedPrograms":
+        """Some of the programs, also repeated."""
+        return NumberedPrograms(
+            *(each[which] for each in (self.tokens, self.kinds, self.below, self.numbers))
+        )
+
+    def limited(self, numbers: Int[Tensor, "*n 3"]) -> Int[Tensor, "*n 3"]:
+        """The nearest numbers that are allowed."""
+        return torch.cat([numbers[..., :2].clamp(*CENTERS), numbers[..., 2:].clamp(*SIZES)], -1)
+
+    def words(self) -> Int[Tensor, "n 64"]:
+        """The packed pictures. Each different primitive is drawn once."""
+        there = self.kinds >= 0
+        each = torch.cat([self.kinds[there].unsqueeze(1), self.numbers[there]], 1)
+        distinct, which = each.unique(dim=0, return_inverse=True)
+        canvases = torch.empty((len(distinct), 64), dtype=torch.int64)
+        for kind, letters in enumerate(KINDS):
+            canvases[distinct[:, 0] == kind] = draw_numbers(letters, distinct[distinct[:, 0] == kind, 1:])
+        slot = torch.zeros_like(self.kinds)
+        slot[there] = which
+        primitive = slot.gather(1, (-1 - self.tokens).clamp(min=0))
+        return run(torch.where(self.tokens < 0, primitive, len(distinct) + self.tokens), canvases)[0]
+
+    def images(self) -> Bool[Tensor, "n 64 64"]:
+        return unpack(self.words())
+
+    def unpacked(self, words: Int[Tensor, "k 64"]) -> Bool[Tensor, "k 64 64"]:
+        return unpack(words)
+
+    def programs(self) -> list[Program]:
+        """The programs with their present numbers."""
+        return [self._program(row) for row in range(len(self.tokens))]
+
+    def _program(self, row: int) -> Program:
+        statements: list[Primitive | Operation] = []
+        for token in self.tokens[row].tolist():
+            if token == len(OPERATIONS):
+                break
+            if token >= 0:
+                statements.append(Operation(OPERATIONS[token]))
+            else:
+                kind = KINDS[int(self.kinds[row, -1 - token])]
+                statements.append(Primitive(kind, tuple(self.numbers[row, -1 - token].tolist())))
+        return Program(tuple(statements))
+
+
+def numbered(programs: Sequence[Program]) -> NumberedPrograms:
+    """Programs of the plane, of any lengths, as tensors."""
+    length = max(map(len, programs), default=1)
+    most = (length + 1) // 2
+    tokens = torch.full((len(programs), length), len(OPERATIONS))
+    kinds = torch.full((len(programs), most), -1)
+    below = torch.zeros((len(programs), length, most), dtype=torch.bool)
+    numbers = torch.zeros((len(programs), most, 3), dtype=torch.long)
+    for row, program in enumerate(programs):
+        stack: list[Tensor] = []
+        primitive = 0
+        for place, statement in enumerate(program.statements):
+            if isinstance(statement, Operation):
+                tokens[row, place] = OPERATIONS.index(statement.symbol)
+                right, left = stack.pop(), stack.pop()
+                stack.append(left | right)
+            else:
+                tokens[row, place] = -1 - primitive
+                kinds[row, primitive] = KINDS.index(statement.kind)
+                numbers[row, primitive] = torch.tensor(statement.numbers)
+                stack.append(torch.arange(most) == primitive)
+                primitive += 1
+            below[row, place] = stack[-1]
+    return NumberedPrograms(tokens, kinds, below, numbers)

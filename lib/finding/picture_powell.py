@@ -1,0 +1,45 @@
+"""Visually guided refinement as in CSGNet's paper (3.2): Powell's method on the centers and sizes of one program.
+
+SciPy's implementation searches along one direction after another, in real numbers; the objective rounds them towards
+zero and keeps them in range, as the authors' does, so that it is a landscape of steps. Slow and simple, to compare
+`picture_refining` with. (The authors let sizes grow to 56 while they search, and cut them to 32 in the end.)
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+from jaxtyping import Bool
+from scipy.optimize import minimize
+from torch import Tensor
+
+from lib.interpreters.csg import Program
+from lib.metrics.images import image_chamfer
+
+from .picture_numbers import numbered
+
+TOLERANCE = 1e-4  # the authors'
+
+
+def refine_by_powell(
+    program: Program, target: Bool[Tensor, "64 64"], iterations: int | None = None
+) -> tuple[Program, float]:
+    """The program with better numbers, and its Chamfer distance to the target, px; never worse than before.
+
+    iterations  of Powell's method; None: until they gain less than TOLERANCE
+    """
+    start = numbered([program])
+    best = [image_chamfer(target[None], start.images()).item(), start]
+
+    def distance(vector: np.ndarray) -> float:
+        numbers = torch.from_numpy(np.trunc(vector).astype(np.int64)).view(start.numbers.shape)
+        tried = replace(start, numbers=start.limited(numbers))
+        found = image_chamfer(target[None], tried.images()).item()
+        if found < best[0]:
+            best[:] = found, tried
+        return found
+
+    options = {} if iterations is None else {"maxiter": iterations}
+    vector = start.numbers.flatten().double().numpy()
+    minimize(distance, vector, method="Powell", tol=TOLERANCE, options=options)
+    return best[1].programs()[0], best[0]

@@ -1,0 +1,97 @@
+"""python -m lib.training csgnet_reinforce [options]: a trained CSGNet goes on without a teacher; see `reinforce`."""
+
+import argparse
+import hashlib
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from ..datasets import DataError, silhouettes
+from ..models.csgnet import CSGNet, CSGNetConfig
+from ..models.pretrained import pretrained
+from ..models.weights import load
+from .commands import Command, Job, Setting
+from .loop import Schedule, TrainingError
+from .reinforce import BASELINES, Actor, ReinforceTask
+
+SCRATCH = "scratch"
+SETTINGS = (
+    Setting("epochs", int, 20, 100, "passes over the pictures"),
+    Setting("batch", int, 64, 3000, "pictures a step"),
+    Setting("samples", int, 16, 1, "programs drawn for each picture"),
+    Setting("rate", float, 2e-4, 0.01, "the learning rate at its highest"),
+    Setting("momentum", float, 0.0, 0.9, "of gradient descent; 0: Adam"),
+    Setting("warmup", float, 0.02, 0.0, "share of the steps in which the rate grows from 0"),
+    Setting("last", float, 0.05, 1.0, "the rate at the end, as a share of the highest"),
+    Setting("clip", float, 1.0, 10.0, "largest norm of the gradient"),
+    Setting("power", float, 20, 20, "of the reward"),
+    Setting("grammar", int, 1, 0, "1: draw only programs that can be executed"),
+)
+VALIDATED = 500  # pictures that are scored after every epoch
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Where to begin, and from which pictures to learn."""
+    start = f"weights to begin with (default: those that come with the project), or {SCRATCH!r}"
+    parser.add_argument("--start", metavar="PATH", help=start)
+    parser.add_argument("--source", help="whose silhouettes (default: all that were made)")
+    told = "what is subtracted from rewards (default: the paper's running average)"
+    parser.add_argument("--baseline", choices=BASELINES, default=BASELINES[0], help=told)
+
+
+def folder(options: argparse.Namespace) -> Path:
+    """runs/csgnet-reinforce or runs/csgnet-reinforce-scratch"""
+    return Path("runs") / ("csgnet-reinforce" + (f"-{SCRATCH}" if options.start == SCRATCH else ""))
+
+
+def job(options: argparse.Namespace) -> Job:
+    """REINFORCE on the training silhouettes; some of validation are scored after every epoch."""
+    names = ("epochs", "batch", "rate", "warmup", "last", "clip", "seed", "momentum")
+    schedule = Schedule(**{name: getattr(options, name) for name in names})
+    masks = silhouettes(options.source, "train")
+    others = silhouettes(options.source, "val")
+    if not len(masks) or not len(others):
+        raise DataError(
+            f"there are {len(masks)} pictures to learn from, {len(others)} to test; expected some of both"
+        )
+    torch.manual_seed(options.seed)
+    network, begun = _network(options)
+    images = masks.images
+    about = {
+        "data": _digest(images), "start": begun, "samples": options.samples, "baseline": options.baseline,
+        "power": options.power, "grammar": options.grammar, "precision": options.precision,
+    }  # fmt: skip
+    step = max(1, len(others) // VALIDATED)
+    try:
+        task = ReinforceTask(
+            Actor(network), images, others.images[::step][:VALIDATED], options.samples, options.baseline,
+            options.power, bool(options.grammar), about,
+        )  # fmt: skip
+    except ValueError as error:
+        raise TrainingError(str(error)) from error
+    return Job(task, schedule, network, masks.describe())
+
+
+def _network(options: argparse.Namespace) -> tuple[CSGNet, str]:
+    """The network to begin with, and what names it."""
+    if options.start == SCRATCH:
+        return CSGNet((CSGNetConfig.paper if options.paper else CSGNetConfig.compact)(2)), SCRATCH
+    path = Path(options.start) if options.start else pretrained("csgnet_2d")
+    network = load(CSGNet, path)
+    if network.config.dimensions != 2:
+        raise TrainingError(f"{path}: found a network of space; expected one of the plane")
+    return network, hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def _digest(images: Tensor) -> str:
+    return hashlib.sha256(images.numpy().data).hexdigest()[:16]
+
+
+COMMAND = Command(
+    "CSGNet on pictures without programs: it tries, and is rewarded for likeness",
+    SETTINGS,
+    add_options,
+    job,
+    folder,
+)

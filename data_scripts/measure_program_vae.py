@@ -22,11 +22,9 @@ minutes on two cores; --quick takes 48 samples.
 
 import argparse
 import json
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from datetime import date
 from hashlib import sha256
 from pathlib import Path
 
@@ -34,8 +32,8 @@ import numpy as np
 import torch
 
 from data_scripts.ending import exit_code
-from data_scripts.journal import code_digest, write_whole
-from data_scripts.measuring import INTERRUPTED, check_seed, check_writable
+from data_scripts.journal import write_whole
+from data_scripts.measuring import INTERRUPTED, check_seed, check_writable, version
 from lib.datasets import CATEGORIES, REPOSITORY, DataError, shapeassembly
 from lib.interpreters.shapeassembly import Program, Shapes, execute_many
 from lib.metrics.chamfer import novelty
@@ -61,6 +59,7 @@ ABLATIONS = ("flat", "no_order", "no_align", "no_macros")
 # the standard normal distribution that what is drawn from there has a Fréchet distance of 871, and of 18 fitted.
 FITTED = ("ours_fitted", *ABLATIONS)
 WRITTEN = ("ours", "ours_authors_rules", "no_reject", *FITTED)
+DECIDING = ("interpreters", "models", "metrics", "training")  # parts of lib that the numbers come from
 METHODS = (*WRITTEN, "ground_truth", "validation", "interpolation")
 CLOUD = 1_024  # points on a shape, for what PointNet sees
 # Of codes from a fitted distribution: of 0.75 to 1, chosen on other samples than those of the rows.
@@ -192,16 +191,7 @@ def measure(category: str, method: str, weights: Path, samples: int, seed: int) 
         else:
             row = written_row(category, method, network, samples, seed)
     seconds = {"seconds": round(time.perf_counter() - start, 1)}
-    return {**header, "samples": samples, **version(), **_rounded(row), **seconds}
-
-
-def version() -> dict[str, str]:
-    """Date, commit, and a digest of the code that decides the numbers."""
-    asked = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, cwd=REPOSITORY
-    )
-    digest = code_digest("interpreters", "models", "metrics", "training")
-    return {"date": date.today().isoformat(), "commit": asked.stdout.strip(), "code": digest}
+    return {**header, "samples": samples, **version(*DECIDING), **_rounded(row), **seconds}
 
 
 def _rounded(row: dict) -> dict:

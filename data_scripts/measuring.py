@@ -3,13 +3,15 @@
 import argparse
 import json
 import os
+import subprocess
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 
 import torch
 
 from data_scripts.ending import exit_code
-from data_scripts.journal import write_whole
+from data_scripts.journal import code_digest, write_whole
 from lib.datasets import REPOSITORY, DataError
 
 INTERRUPTED = "interrupted; nothing was written"
@@ -61,3 +63,11 @@ def check_seed(seed: int) -> None:
     """Raises DataError for a seed that a generator would refuse, minutes later perhaps."""
     if not 0 <= seed <= LARGEST_SEED:
         raise DataError(f"--seed is {seed}; expected 0 to {LARGEST_SEED}")
+
+
+def version(*parts: str) -> dict[str, str]:
+    """Date, commit, and a digest of the code that decides the numbers: `parts` of lib."""
+    asked = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, cwd=REPOSITORY
+    )
+    return {"date": date.today().isoformat(), "commit": asked.stdout.strip(), "code": code_digest(*parts)}

@@ -1,4 +1,4 @@
-"""Which of several programs draws a picture, or a grid of voxels, best. (CSGNet's beam search ends with this choice.)"""
+"""Which of several programs draws a picture, or a grid of voxels, best. (CSGNet's beam search ends so.)"""
 
 from dataclasses import dataclass
 

@@ -8,7 +8,6 @@ Known programs are sorted by that number and looked at from the target's own num
 nearer. Canvases are drawn again when they are needed, so a million of them need no memory.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Programs of the plane with their centers and sizes as one tensor: many variants of many programs, drawn as a batch."""
+"""Programs of the plane with their centers and sizes as one tensor: many variants of many, drawn as a batch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

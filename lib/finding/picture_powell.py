@@ -23,13 +23,18 @@ TOLERANCE = 1e-4  # the authors'
 
 def refine_by_powell(
     program: Program, target: Bool[Tensor, "64 64"], iterations: int | None = None
-) -> tuple[Program, float]:
-    """The program with better numbers, and its Chamfer distance to the target, px; never worse than before.
+) -> tuple[Program, list[float]]:
+    """The program with better numbers, and its Chamfer distance to the target, px, before and after each iteration.
 
-    iterations  of Powell's method; None: until they gain less than TOLERANCE
+    iterations  of Powell's method, at most; None: until they gain less than TOLERANCE
     """
     start = numbered([program])
-    best = [image_chamfer(target[None], start.images()).item(), start]
+    first = image_chamfer(target[None], start.images()).item()
+    best: list = [
+        first,
+        start,
+    ]  # what the search has met: its own answer may lie between two steps of the landscape
+    distances = [first]
 
     def distance(vector: np.ndarray) -> float:
         numbers = torch.from_numpy(np.trunc(vector).astype(np.int64)).view(start.numbers.shape)
@@ -39,7 +44,12 @@ def refine_by_powell(
             best[:] = found, tried
         return found
 
-    options = {} if iterations is None else {"maxiter": iterations}
-    vector = start.numbers.flatten().double().numpy()
-    minimize(distance, vector, method="Powell", tol=TOLERANCE, options=options)
-    return best[1].programs()[0], best[0]
+    minimize(
+        distance,
+        start.numbers.flatten().double().numpy(),
+        method="Powell",
+        tol=TOLERANCE,
+        callback=lambda _: distances.append(best[0]),
+        options={} if iterations is None else {"maxiter": iterations},
+    )
+    return best[1].programs()[0], distances

@@ -36,8 +36,8 @@ MOST_SWEEPS = 100
 
 @dataclass(frozen=True)
 class Refined:
-    """programs: the best found; distances: (sweeps + 1, n) Chamfer distances, px, before the first sweep and after each;
-    history: the numbers (n, primitives, 3) that belong to each row of distances."""
+    """programs: the best found; distances: (sweeps + 1, n) Chamfer distances, px, before the first sweep and after
+    each; history: the numbers (n, primitives, 3) that belong to each row of distances."""
 
     programs: list[Program]
     distances: Float[Tensor, "sweeps n"]

@@ -28,8 +28,8 @@ class CSGNetConfig:
     tokens      of the vocabulary, `$` included
     channels    of each convolution, the first one's first; after it comes ReLU
     kernels     their widths; strides: how far they move; pools: how many outputs along each side become one, by maximum
-    norm        what comes after each convolution and pooling: "none", "batch" (paper, in space), or "group", which scales
-                each shape by its own mean and spread, so that others of its batch do not matter
+    norm        what comes after each convolution and pooling: "none", "batch" (paper, in space), or "group", which
+                scales each shape by its own mean and spread, so that others of its batch do not matter
     embedding, hidden   widths of what stands for a token, and of the GRU
     dropout     share of the values that are dropped in training: after convolutions, GRU and linear layer
     Raises ValueError for lists of different lengths, sizes below 1, and canvases that do not divide.

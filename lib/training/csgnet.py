@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from ..datasets.csg import TokenSet
 from ..interpreters.csg import execute_many
+from ..interpreters.csg.ordering import ordered
 from ..metrics.images import image_chamfer, iou
 from ..models.csgnet import CSGNet
 from ..models.csgnet_decoding import write
@@ -44,6 +45,7 @@ class ParseTask:
 
     per_epoch   programs an epoch
     curriculum  share of all steps in which the longest programs that are shown grow from the shortest to all of them
+    in_order    teach programs with the operands of unions and intersections in a fixed order, not as they are
     about       JSON: data and settings that must be the same when a run goes on
     """
 
@@ -52,6 +54,7 @@ class ParseTask:
     other: TokenSet
     per_epoch: int
     curriculum: float
+    in_order: bool
     about: dict
     drawing: float = field(default=0.0, init=False)  # seconds since the last report
     started: float = field(default_factory=time.perf_counter, init=False)
@@ -72,12 +75,16 @@ class ParseTask:
     ) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of as many random programs as there are picks."""
         tokens = self.train.tokens[torch.randint(self.shown(progress), (len(picks),), generator=noise)]
-        tokens = tokens[:, : int((tokens != self.train.vocabulary.stop).sum(1).max()) + 1]
+        tokens = self.taught(tokens[:, : int((tokens != self.train.vocabulary.stop).sum(1).max()) + 1])
         start = time.perf_counter()
         device = next(network.parameters()).device
         canvases = drawn(tokens, self.train, device)
         self.drawing += time.perf_counter() - start
         return network(canvases, tokens.to(device)), {}
+
+    def taught(self, tokens: Int[Tensor, "rows length"]) -> Int[Tensor, "rows length"]:
+        """The programs as the network is to write them."""
+        return ordered(tokens, self.train.vocabulary) if self.in_order else tokens
 
     def shown(self, progress: float) -> int:
         """How many of the programs, the shortest first, are drawn from when a share `progress` of all steps is done."""
@@ -97,7 +104,7 @@ class ParseTask:
         sums = {"val_loss": 0.0, "val_cd" if self.other.vocabulary.dimensions == 2 else "val_iou": 0.0}
         likeness = list(sums)[1]
         for start in range(0, len(self.other), PER_REPORT):
-            tokens = self.other.tokens[start : start + PER_REPORT]
+            tokens = self.taught(self.other.tokens[start : start + PER_REPORT])
             canvases = drawn(tokens, self.other, device)
             sums["val_loss"] += network(canvases, tokens.to(device)).item() * len(tokens)
             answers = drawn(write(self.module.network, canvases).tokens, self.other, device)

@@ -63,7 +63,7 @@ DECIDING = ("interpreters", "models", "metrics", "finding")  # parts of lib that
 
 
 def synthetic(dimensions: int, network: CSGNet, count: int, quick: bool) -> dict:
-    """Tables 2 and 4: mean likeness of the answers to the shapes, of all and by length of the program that drew them."""
+    """Tables 2 and 4: mean likeness of the answers to the shapes, all and by length of the program that drew them."""
     test = evenly(csg_programs(dimensions, "test"), count)
     lengths = (test.tokens != test.vocabulary.stop).sum(1)
     train = csg_programs(dimensions, "train")

@@ -24,6 +24,9 @@ SETTINGS = (
     Setting(
         "curriculum", float, 0.0, 0.0, "share of the steps in which the longest programs grow to all lengths"
     ),
+    Setting(
+        "in_order", int, 1, 0, "1: operands of unions and intersections in a fixed order; 0: as they are"
+    ),
 )
 VALIDATED = 1000  # programs that are scored after every epoch
 
@@ -54,9 +57,18 @@ def job(options: argparse.Namespace) -> Job:
     network = CSGNet(config)
     about = {
         "dimensions": options.dimensions, "data": digest(programs), "network": asdict(config),
-        "programs": options.programs, "curriculum": options.curriculum, "precision": options.precision,
+        "programs": options.programs, "curriculum": options.curriculum, "in_order": options.in_order, 
+        "precision": options.precision,
     }  # fmt: skip
-    task = ParseTask(Teacher(network), programs, others, options.programs, options.curriculum, about)
+    task = ParseTask(
+        Teacher(network),
+        programs,
+        others,
+        options.programs,
+        options.curriculum,
+        bool(options.in_order),
+        about,
+    )
     return Job(task, schedule, network, programs.describe())
 
 

@@ -2,8 +2,8 @@
 
     A + B = B + A,  (A + B) + C = A + (B + C), and the same for intersections; nothing is moved across a subtraction
 
-What is united (or intersected) in a row is sorted, longer parts first, then by tokens, and joined from left to right. The
-picture stays the same, to the bit, and so does the length.
+What is united (or intersected) in a row is sorted, longer parts first, then by tokens, and joined from left to right.
+The picture stays the same, to the bit, and so does the length.
 """
 
 from collections.abc import Iterable

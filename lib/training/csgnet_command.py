@@ -57,7 +57,7 @@ def job(options: argparse.Namespace) -> Job:
     network = CSGNet(config)
     about = {
         "dimensions": options.dimensions, "data": digest(programs), "network": asdict(config),
-        "programs": options.programs, "curriculum": options.curriculum, "in_order": options.in_order, 
+        "programs": options.programs, "curriculum": options.curriculum, "in_order": options.in_order,
         "precision": options.precision,
     }  # fmt: skip
     task = ParseTask(

@@ -88,7 +88,7 @@ class CSGNetConfig:
         """Sizes that train on two cores: convolutions that stride instead of pooling, and a smaller GRU."""
         if dimensions == 2:
             channels, kernels, strides = (16, 32, 64, 64, 16), (4, 4, 4, 3, 1), (2, 2, 2, 1, 1)
-            return cls(2, 400, channels, kernels, strides, (1,) * 5, "batch", 64, 512, 0.0)
+            return cls(2, 400, channels, kernels, strides, (1,) * 5, "batch", 64, 496, 0.0)
         channels, kernels, strides = (32, 48, 64, 96, 16), (4, 4, 3, 2, 1), (4, 2, 1, 2, 1)
         return cls(3, 6635, channels, kernels, strides, (1,) * 5, "group", 32, 224, 0.0)
 

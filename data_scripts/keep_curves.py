@@ -1,0 +1,57 @@
+"""Keep the curves of trainings: logs of runs, epoch by epoch, as one file that the notebooks draw.
+
+    python -m data_scripts.keep_curves "supervised start=runs/csgnet-reinforce" "from scratch=runs/scratch"
+
+Writes results/csgnet/reinforce_curves.json: {"runs": [{"name", "command", "log": [{"epoch", …}, …]}, …]}. The names are
+those that the curves get in the drawing. A run that has not ended is kept as far as it is, without a command.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from data_scripts.ending import exit_code
+from data_scripts.journal import write_whole
+from data_scripts.measuring import INTERRUPTED, check_writable
+from lib.datasets import REPOSITORY, DataError
+from lib.training.loop import LOG
+
+CURVES = REPOSITORY / "results" / "csgnet" / "reinforce_curves.json"
+
+
+def curve(named: str) -> dict:
+    """One run, given as NAME=FOLDER. Raises DataError for anything else, and for a folder without a log."""
+    name, equals, folder = named.partition("=")
+    path = Path(folder) / LOG
+    if not (name and equals and path.is_file()):
+        raise DataError(f"found {named!r}; expected NAME=FOLDER, and a {LOG} in the folder")
+    try:
+        log = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        facts = [json.loads(each.read_text(encoding="utf-8")) for each in sorted(Path(folder).glob("*.json"))]
+    except ValueError as error:
+        raise DataError(f"{folder}: a file in it is damaged ({error})") from error
+    command = {"command": facts[0]["command"]} if facts else {}
+    return {"name": name, **command, "log": log}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command. Returns the exit code: 0 finished, 1 nothing could be kept, 130 interrupted."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("runs", nargs="+", metavar="NAME=FOLDER")
+    parser.add_argument("--out", type=Path, default=CURVES, help=f"default: {CURVES.relative_to(REPOSITORY)}")
+    options = parser.parse_args(arguments)
+
+    def work() -> None:
+        check_writable(options.out)
+        found = {"runs": [curve(named) for named in options.runs]}
+        write_whole(options.out, (json.dumps(found, indent=1) + "\n").encode())
+        print(f"{len(found['runs'])} curves kept in {options.out}")
+
+    return exit_code(work, INTERRUPTED)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -211,20 +211,20 @@ def show_primitives(programs, titles: Sequence[str] | None = None, *, scale: flo
     for place, (program, title) in enumerate(zip(programs, titles)):
         x, y = place * cell + GAP // 2, GAP // 2
         stamp(ax, image_of(program), x, y, "#d3d9e2")
-        for primitive, cut in _signed(program):
-            _outline(ax, primitive, cut, x, y)
+        for primitive, cut in signed(program):
+            outline(ax, primitive, cut, x, y)
         write(ax, title, x + SIDE / 2, y + SIDE + 4 / scale)
     kinds = [
         kind for kind in COLORS if any(p.kind == kind for program in programs for p in program.primitives)
     ]
     keys = [Line2D([], [], color=COLORS[kind], label=KINDS[kind].name) for kind in kinds]
-    if any(cut for program in programs for _, cut in _signed(program)):
+    if any(cut for program in programs for _, cut in signed(program)):
         keys.append(Line2D([], [], color=SOFT, linestyle=(0, (3, 2)), label="cut away"))
     _legend(ax, keys, len(programs) * cell / 2, cell + (below - 4) / scale)
     return figure
 
 
-def _signed(program: Program) -> list[tuple[Primitive, bool]]:
+def signed(program: Program) -> list[tuple[Primitive, bool]]:
     """Each primitive, and whether it stands on the right of an odd number of subtractions."""
     found, waiting = [], [(program.tree(), False)]
     while waiting:
@@ -236,23 +236,30 @@ def _signed(program: Program) -> list[tuple[Primitive, bool]]:
     return found
 
 
-def _outline(ax: Axes, primitive: Primitive, cut: bool, x: float, y: float) -> None:
-    """The outline of a primitive of the plane on the picture at (x, y), along the rim of its pixels."""
-    px, py, r = primitive.numbers
-    if primitive.kind == "c":
-        shape = Circle((x + px + 0.5, y + py + 0.5), r - 0.5)
-    elif primitive.kind == "s":
-        half = 1.412 * r / 2
-        left, top, right, bottom = (int(edge) for edge in (px - half, py - half, px + half, py + half))
-        shape = Rectangle((x + left, y + top), right + 1 - left, bottom + 1 - top)
+def outline(ax: Axes, primitive: Primitive, cut: bool, x: float, y: float) -> None:
+    """The outline of a primitive of the plane on the picture at (x, y); dashed if it is cut away."""
+    rim = rim_of(primitive)
+    if isinstance(rim, list):
+        shape = Polygon([(x + u, y + v) for u, v in rim])
     else:
-        apex, base, left, right = (int(edge) for edge in triangle_corners(tensor(primitive.numbers)))
-        corners = [(px + 0.5, apex - 0.5), (right + 1, base + 1), (left, base + 1)]
-        shape = Polygon([(x + u, y + v) for u, v in corners])
+        shape = Circle((x + rim[0], y + rim[1]), rim[2])
     shape.set(fill=False, edgecolor=COLORS[primitive.kind], linewidth=1.8, zorder=1.2, joinstyle="round")
     shape.set_linestyle((0, (3, 2)) if cut else "-")
     ax.add_patch(shape)
     shape.set_clip_path(Rectangle((x, y), SIDE, SIDE, transform=ax.transData))
+
+
+def rim_of(primitive: Primitive) -> tuple[float, float, float] | list[tuple[float, float]]:
+    """The rim of the pixels of a primitive of the plane: x, y and radius of a circle, or corners. Pixel 0 is 0 to 1."""
+    px, py, r = primitive.numbers
+    if primitive.kind == "c":
+        return px + 0.5, py + 0.5, r - 0.5
+    if primitive.kind == "s":
+        half = 1.412 * r / 2
+        left, top, right, bottom = (int(edge) for edge in (px - half, py - half, px + half, py + half))
+        return [(left, top), (right + 1, top), (right + 1, bottom + 1), (left, bottom + 1)]
+    apex, base, left, right = (int(edge) for edge in triangle_corners(tensor(primitive.numbers)))
+    return [(px + 0.5, apex - 0.5), (right + 1, base + 1), (left, base + 1)]
 
 
 def _legend(ax: Axes, keys: list, x: float, y: float) -> None:

@@ -1,0 +1,68 @@
+"""What longer runs of CSGNet without a teacher came to, read from results/csgnet, beside the paper's Table 3.
+
+long_runs()          curves of trainings, or None where they were not kept
+print(table_3())     the table of results/csgnet/silhouettes.json, or which command makes it
+"""
+
+import json
+from pathlib import Path
+
+FOLDER = Path(__file__).parents[2] / "results" / "csgnet"
+CURVES, TABLE = "reinforce_curves.json", "silhouettes.json"
+TRAIN = "python -m lib.training csgnet_reinforce"
+NO_CURVES = (
+    f"results/csgnet/{CURVES} is not there yet; these make such curves, in runs/: "
+    f"`{TRAIN}`, and `{TRAIN} --start scratch`"
+)
+NO_TABLE = (
+    f"results/csgnet/{TABLE} is not there yet; this measures it: "
+    "python -m data_scripts.measure_csgnet silhouettes"
+)
+SWEEPS = {"0": "i=0", "1": "1", "2": "2", "4": "4", "10": "10", "None": "end"}  # in our file -> heading
+PAPER = {  # mean Chamfer distance, px, after so many iterations of refinement: Sharma et al. 2018, Table 3
+    "nearest": (1.92, 1.22, 1.13, 1.08, 1.07, 1.07),
+    "supervised k=1": (2.30, 1.13, 0.97, 0.91, 0.90, 0.90),
+    "supervised k=10": (1.60, 0.71, 0.60, 0.56, 0.55, 0.55),
+    "reinforced k=1": (1.26, 0.61, 0.54, 0.52, 0.51, 0.51),
+    "reinforced k=10": (1.14, 0.50, 0.44, 0.42, 0.42, 0.41),
+}
+
+
+def long_runs(folder: Path = FOLDER) -> list[dict] | None:
+    """[{"name": …, "log": one row an epoch}]; None where the file is missing."""
+    path = folder / CURVES
+    return json.loads(path.read_text(encoding="utf-8"))["runs"] if path.is_file() else None
+
+
+def table_3(folder: Path = FOLDER) -> str:
+    """Mean Chamfer distances to silhouettes, px, by iterations of refinement: ours, and the paper's below each."""
+    path = folder / TABLE
+    if not path.is_file():
+        return NO_TABLE
+    found = json.loads(path.read_text(encoding="utf-8"))
+    lines = [f"{found['samples']} silhouettes ({found['data']})", " " * 24 + _cells(SWEEPS.values())]
+    for name, printed in PAPER.items():
+        if name in found["rows"]:
+            ours = found["rows"][name]["chamfer_px"]
+            lines.append(f"{name:16s}{'ours':8s}{_cells(f'{ours[n]:.2f}' for n in SWEEPS)}")
+            lines.append(f"{'':16s}{'paper':8s}{_cells(f'{value:.2f}' for value in printed)}")
+    return "\n".join([*lines, *_powell_lines(found)])
+
+
+def _powell_lines(found: dict) -> list[str]:
+    """Powell's method and ours on the same silhouettes, from the best network's answers, where that was measured."""
+    row = found["rows"].get("reinforced k=10", {})
+    if "powell_px" not in row:
+        return []
+    lines = [f"reinforced k=10, {found['powell_samples']} of these:"]
+    for name, key, seconds in (
+        ("our sweeps", "same_as_powell_px", "seconds_each"),
+        ("Powell's method", "powell_px", "powell_seconds_each"),
+    ):
+        cells = _cells(f"{row[key][n]:.2f}" for n in SWEEPS)
+        lines.append(f"  {name:22s}{cells}   {row[seconds]:.2g} s each, to the end")
+    return lines
+
+
+def _cells(texts) -> str:
+    return "".join(f"{text:>7s}" for text in texts)

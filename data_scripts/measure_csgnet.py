@@ -20,6 +20,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -38,12 +39,13 @@ from lib.finding.picture_nearest import nearest
 from lib.finding.picture_powell import refine_by_powell
 from lib.finding.picture_refining import refine
 from lib.finding.primitive_detection import detection_precision
-from lib.interpreters.csg import Program, execute_many, vocabulary_of
+from lib.interpreters.csg import Program, Shapes, execute_many, vocabulary_of
 from lib.interpreters.csg.packing import pack
 from lib.models.csgnet import CSGNet
 from lib.models.csgnet_beams import beam_search
 from lib.models.pretrained import pretrained
 from lib.models.weights import CheckpointError, load
+from lib.training.csgnet_command import evenly, spread
 
 FOLDER = REPOSITORY / "results" / "csgnet"
 TABLES = ("synthetic", "silhouettes", "detection", "logos")
@@ -64,78 +66,58 @@ DECIDING = ("interpreters", "models", "metrics", "finding")  # parts of lib that
 
 def synthetic(dimensions: int, network: CSGNet, count: int, quick: bool) -> dict:
     """Tables 2 and 4: mean likeness of the answers to the shapes, all and by length of the program that drew them."""
-    test = evenly(csg_programs(dimensions, "test"), count)
-    lengths = (test.tokens != test.vocabulary.stop).sum(1)
-    train = csg_programs(dimensions, "train")
-    known = train.tokens[:: 100 if quick else 1]
-    rows = {"nearest": compared(test, lengths, neighbours(test, known))}
-    for k in BEAMS:
-        rows[f"k={k}"] = compared(test, lengths, parsed(network, test, k))
+    test, known = evenly(csg_programs(dimensions, "test"), count), known_programs(dimensions, quick)
+    shapes = execute_many(test.tokens, test.vocabulary)
+    canvases = shapes.images if dimensions == 2 else shapes.grids
+    methods = {"nearest": partial(neighbours, canvases, shapes.words, known)}
+    methods |= {f"k={k}": partial(parsed, network, canvases, k) for k in BEAMS}
+    rows = {}
+    for name, method in methods.items():
+        start = time.perf_counter()
+        choice = method()
+        seconds = (time.perf_counter() - start) / len(test)
+        rows[name] = compared(shapes, choice) | {"seconds_each": seconds}
     return {"data": test.source, "samples": len(test), "known": len(known), "rows": rows}
 
 
-def neighbours(test: TokenSet, known: Tensor) -> tuple[Choice, float]:
-    """The nearest known program of each test program, and seconds a shape."""
-    start = time.perf_counter()
-    parts = test.tokens.split(1000)  # so many shapes of space are 32 MB
-    index = torch.cat(
-        [nearest(execute_many(p, test.vocabulary).words, known, test.vocabulary).index for p in parts]
-    )
-    seconds = (time.perf_counter() - start) / len(test)
-    return joined(
-        [
-            best_of(canvases(p, test), known[i].unsqueeze(1))
-            for p, i in zip(test.tokens.split(AT_ONCE), index.split(AT_ONCE))
-        ]
-    ), seconds
+def known_programs(dimensions: int, quick: bool) -> TokenSet:
+    """What the nearest neighbours are searched in."""
+    return csg_programs(dimensions, "train")[:: 100 if quick else 1]
 
 
-def parsed(network: CSGNet, test: TokenSet, k: int) -> tuple[Choice, float]:
-    """The best of k programs that the network writes for each test program, and seconds a shape for all k."""
-    seconds, choices = 0.0, []
-    for part in tqdm(test.tokens.split(AT_ONCE), desc=f"k={k}", leave=False, disable=None):
-        shapes = canvases(part, test)
-        start = time.perf_counter()
-        beams = beam_search(network, shapes, k)
-        choices.append(best_of(shapes, beams.tokens))
-        seconds += time.perf_counter() - start
-    return joined(choices), seconds / len(test)
+def neighbours(canvases: Tensor, words: Tensor, known: TokenSet) -> Choice:
+    """The nearest known program of each shape, which is given as a canvas and as packed words."""
+    index = nearest(words, known.tokens, known.vocabulary).index
+    return best_of(canvases, known.tokens[index].unsqueeze(1))
 
 
-def canvases(tokens: Tensor, programs: TokenSet) -> Tensor:
-    shapes = execute_many(tokens, programs.vocabulary)
-    return shapes.images if shapes.dimensions == 2 else shapes.grids
+def parsed(network: CSGNet, canvases: Tensor, k: int) -> Choice:
+    """The best of k programs that the network writes for each shape."""
+    return best_of(canvases, beams_of(network, canvases, k))
 
 
-def joined(choices: Sequence[Choice]) -> Choice:
-    """The choices for several batches as one; programs may be of different lengths."""
-    longest = max(choice.tokens.shape[1] for choice in choices)
-    stop = max(
-        int(choice.tokens.max()) for choice in choices
-    )  # every program is followed by `$`, the last token
-    padded = [
-        torch.nn.functional.pad(c.tokens, (0, longest - c.tokens.shape[1]), value=stop) for c in choices
-    ]
-    return Choice(
-        torch.cat(padded), torch.cat([c.best for c in choices]), torch.cat([c.measure for c in choices])
+def beams_of(network: CSGNet, canvases: Tensor, k: int) -> Tensor:
+    """The network's k likeliest programs for each shape, (n, k, length), searched for some shapes at a time."""
+    parts = tqdm(canvases.split(AT_ONCE), desc=f"k={k}", leave=False, disable=None)
+    found = [beam_search(network, part, k).tokens for part in parts]
+    longest = max(tokens.shape[2] for tokens in found)
+    return torch.cat(
+        [torch.nn.functional.pad(t, (0, longest - t.shape[2]), value=network.stop) for t in found]
     )
 
 
-def compared(test: TokenSet, lengths: Tensor, answer: tuple[Choice, float]) -> dict:
+def compared(shapes: Shapes, choice: Choice) -> dict:
     """A row: mean measure (Chamfer distance, px, or IoU, percent), of all and by length; percent that are exact."""
-    choice, seconds = answer
-    plane = test.vocabulary.dimensions == 2
-    measure = choice.of_best if plane else 100 * choice.of_best
-    drawn, written = (execute_many(t, test.vocabulary) for t in (test.tokens, choice.tokens))
-    exact = (drawn.words == written.words).all(1).double()
-    each = {int(n): float(measure[lengths == n].double().mean()) for n in lengths.unique()}
-    exact_each = {n: 100 * float(exact[lengths == n].mean()) for n in each}
+    plane = shapes.dimensions == 2
+    measure = (choice.of_best if plane else 100 * choice.of_best).double()
+    exact = 100 * (shapes.words == execute_many(choice.tokens, shapes.vocabulary).words).all(1).double()
+    lengths = (shapes.tokens != shapes.vocabulary.stop).sum(1)
+    of = {int(n): lengths == n for n in lengths.unique()}
     return {
-        "chamfer_px" if plane else "iou_percent": float(measure.double().mean()),
-        "exact_percent": 100 * float(exact.mean()),
-        "by_length": each,
-        "exact_by_length": exact_each,
-        "seconds_each": seconds,
+        "chamfer_px" if plane else "iou_percent": float(measure.mean()),
+        "exact_percent": float(exact.mean()),
+        "by_length": {n: float(measure[rows].mean()) for n, rows in of.items()},
+        "exact_by_length": {n: float(exact[rows].mean()) for n, rows in of.items()},
     }
 
 
@@ -143,56 +125,38 @@ def silhouette_table(supervised: CSGNet, reinforced: CSGNet, count: int, quick: 
     """Table 3: mean Chamfer distance to silhouettes after so many iterations of refinement, coordinate search on all
     and Powell's method on some."""
     masks = silhouettes(split="test")
-    images = masks.images[:: max(1, len(masks) // count)][:count]
-    train = csg_programs(2, "train")
-    known = train.tokens[:: 100 if quick else 1]
-    index = nearest(pack(images), known, train.vocabulary).index
-    answers = {"nearest": best_of(images, known[index].unsqueeze(1))}
+    images, known = masks.images[spread(len(masks), count)], known_programs(2, quick)
+    choices = {"nearest": neighbours(images, pack(images), known)}
     for name, network in {"supervised": supervised, "reinforced": reinforced}.items():
-        for k in (1, 10):
-            answers[f"{name} k={k}"] = best_of(images, beam_search_all(network, images, k))
-    powell = QUICK if quick else POWELL
-    rows = {name: refined(choice, images, min(powell, len(images))) for name, choice in answers.items()}
-    return {
-        "data": masks.source,
-        "samples": len(images),
-        "powell_samples": min(powell, len(images)),
-        "rows": rows,
-    }
+        choices |= {f"{name} k={k}": parsed(network, images, k) for k in (1, 10)}
+    some = spread(len(images), QUICK if quick else POWELL)
+    rows = {name: refined(choice, images, some) for name, choice in choices.items()}
+    return {"data": masks.source, "samples": len(images), "powell_samples": len(some), "rows": rows}
 
 
-def beam_search_all(network: CSGNet, images: Tensor, k: int) -> Tensor:
-    """Programs (n, k, length), searched for some images at a time."""
-    found = [beam_search(network, part, k).tokens for part in images.split(AT_ONCE)]
-    longest = max(tokens.shape[2] for tokens in found)
-    return torch.cat(
-        [torch.nn.functional.pad(t, (0, longest - t.shape[2]), value=network.stop) for t in found]
-    )
-
-
-def refined(choice: Choice, images: Tensor, powell: int) -> dict:
-    """A row of Table 3: distances by iterations ("None" is until the end), and seconds a picture."""
-    programs = [vocabulary_of(2).program(tokens) for tokens in choice.tokens]
+def refined(choice: Choice, images: Tensor, some: Tensor) -> dict:
+    """A row of Table 3: distances by iterations ("None" is until the end), and seconds a picture; Powell's method
+    refines some of the pictures."""
+    programs = programs_of(choice)
     start = time.perf_counter()
-    distances = refine(programs, images).distances.mean(1).tolist()
+    distances = refine(programs, images).distances
     seconds = (time.perf_counter() - start) / len(images)
-    some = range(0, len(images), len(images) // powell)[:powell]
+    bar = tqdm(some.tolist(), desc="Powell", leave=False, disable=None)
     start = time.perf_counter()
-    slow = [by_powell(programs[i], images[i]) for i in tqdm(some, desc="Powell", leave=False, disable=None)]
+    slow = [at_iterations(refine_by_powell(programs[i], images[i])[1]) for i in bar]
     seconds_powell = (time.perf_counter() - start) / len(some)
-    quick = refine([programs[i] for i in some], images[list(some)]).distances.mean(1).tolist()
     return {
-        "chamfer_px": at_iterations(distances),
+        "chamfer_px": at_iterations(distances.mean(1).tolist()),
         "seconds_each": seconds,
-        "same_as_powell_px": at_iterations(quick),
-        "powell_px": {str(n): sum(row[str(n)] for row in slow) / len(slow) for n in SWEEPS},
+        "same_as_powell_px": at_iterations(distances[:, some].mean(1).tolist()),
+        "powell_px": {n: sum(row[n] for row in slow) / len(slow) for n in slow[0]},
         "powell_seconds_each": seconds_powell,
         "tokens": sum(map(len, programs)) / len(programs),
     }
 
 
-def by_powell(program: Program, image: Tensor) -> dict[str, float]:
-    return at_iterations(refine_by_powell(program, image)[1])
+def programs_of(choice: Choice) -> list[Program]:
+    return [vocabulary_of(2).program(tokens) for tokens in choice.tokens]
 
 
 def at_iterations(distances: Sequence[float]) -> dict[str, float]:
@@ -203,10 +167,10 @@ def at_iterations(distances: Sequence[float]) -> dict[str, float]:
 def detection(network: CSGNet, count: int) -> dict:
     """Table 5: average precision of primitives, percent, and images a second."""
     test = evenly(csg_programs(2, "test"), count)
-    images, rows = canvases(test.tokens, test), {}
+    images, rows = execute_many(test.tokens, test.vocabulary).images, {}
     for k in (10, 40):
         start = time.perf_counter()
-        beams = beam_search_all(network, images, k)
+        beams = beams_of(network, images, k)
         seconds = time.perf_counter() - start
         found = detection_precision(beams, test.tokens, test.vocabulary)
         rows[f"k={k}"] = {n: 100 * v for n, v in found.items()} | {"images_a_second": len(images) / seconds}
@@ -216,20 +180,11 @@ def detection(network: CSGNet, count: int) -> dict:
 def logo_table(supervised: CSGNet, reinforced: CSGNet, count: int) -> dict:
     """Mean Chamfer distance to logos, which no network has seen, before and after refinement."""
     masks = logos()
-    images = masks.images[:: max(1, len(masks) // count)][:count]
-    rows = {}
+    images, rows = masks.images[spread(len(masks), count)], {}
     for name, network in {"supervised": supervised, "reinforced": reinforced}.items():
-        choice = best_of(images, beam_search_all(network, images, 10))
-        programs = [vocabulary_of(2).program(tokens) for tokens in choice.tokens]
-        rows[f"{name} k=10"] = {
-            "chamfer_px": at_iterations(refine(programs, images).distances.mean(1).tolist())
-        }
+        found = refine(programs_of(parsed(network, images, 10)), images).distances
+        rows[f"{name} k=10"] = {"chamfer_px": at_iterations(found.mean(1).tolist())}
     return {"data": masks.source, "samples": len(images), "rows": rows}
-
-
-def evenly(programs: TokenSet, count: int) -> TokenSet:
-    """At most so many of the programs, at equal steps: lengths keep the shares of Table 1."""
-    return programs[:: max(1, len(programs) // count)][:count]
 
 
 def measure(options: argparse.Namespace) -> dict:
@@ -238,10 +193,7 @@ def measure(options: argparse.Namespace) -> dict:
     paths = {"weights": options.weights or pretrained(f"csgnet_{options.dimensions}d")}
     if options.table in ("silhouettes", "logos"):
         paths["reinforced"] = options.reinforced or pretrained("csgnet_2d_reinforced")
-    networks = [load(CSGNet, path) for path in paths.values()]
-    for path, network in zip(paths.values(), networks):
-        if network.config.dimensions != options.dimensions:
-            raise DataError(f"{path}: found a network of {network.config.dimensions} dimensions")
+    networks = [network_of(path, options.dimensions) for path in paths.values()]
     count = QUICK if options.quick else options.count or COUNTS[options.table, options.dimensions]
     if options.table == "synthetic":
         found = synthetic(options.dimensions, *networks, count, options.quick)
@@ -253,6 +205,14 @@ def measure(options: argparse.Namespace) -> dict:
     seconds = {"seconds": round(time.perf_counter() - start, 1), "threads": torch.get_num_threads()}
     header = {"table": options.table, "dimensions": options.dimensions, **named, **version(*DECIDING)}
     return header | rounded(found) | seconds
+
+
+def network_of(path: Path, dimensions: int) -> CSGNet:
+    """A trained network. Raises CheckpointError, and DataError for one of other dimensions."""
+    network = load(CSGNet, path)
+    if (found := network.config.dimensions) != dimensions:
+        raise DataError(f"{path}: found a network of {found} dimensions; expected one of {dimensions}")
+    return network
 
 
 def rounded(found):

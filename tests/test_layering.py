@@ -16,7 +16,7 @@ MAY_IMPORT = {  # part of lib -> the parts it may import beside itself
     "metrics": LANGUAGES,
     "finding": ["metrics", *LANGUAGES],
     "training": ["datasets", *GEOMETRY, *LANGUAGES],
-    "viewing": [*GEOMETRY, *LANGUAGES],
+    "viewing": [*GEOMETRY, "finding", *LANGUAGES],
     "exercises": [*GEOMETRY, *LANGUAGES],
     "furniture": ["extractor", *LANGUAGES],
     "datasets": ["extractor", "furniture", *LANGUAGES],

@@ -96,7 +96,7 @@ def test_the_rate_grows_and_falls():
 @pytest.mark.parametrize(
     "wrong",
     [{"epochs": 0}, {"batch": 0}, {"rate": 0.0}, {"rate": math.nan}, {"rate": math.inf}, {"warmup": 2.0},
-     {"clip": -1.0}, {"seed": -1}, {"seed": 2**63}],
+     {"clip": -1.0}, {"seed": -1}, {"seed": 2**63}, {"momentum": -0.1}, {"momentum": 1.5}, {"momentum": math.nan}],
 )  # fmt: skip
 def test_settings_without_sense_are_told(wrong):
     [name] = wrong
@@ -217,6 +217,107 @@ def test_nothing_to_learn_from_is_told(tmp_path):
 
     with pytest.raises(TrainingError, match="nothing to learn from"):
         fit(Nothing(), SCHEDULE, tmp_path)
+
+
+# ---- chance that has no generator of its own ----
+
+
+class Forgetful(Line):
+    """The line, with dropout."""
+
+    def _forward(self, x):
+        return nn.functional.dropout(self.network["line"](x), 0.5, self.network.training)
+
+
+def test_dropout_too_is_the_same_after_a_stop(tmp_path):
+    whole, killed, resumed = Forgetful(), Forgetful(4, KeyboardInterrupt()), Forgetful()
+    torch.manual_seed(1)
+    fit(whole, SCHEDULE, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        fit(killed, SCHEDULE, tmp_path / "killed")
+    torch.manual_seed(2)
+    fit(resumed, SCHEDULE, tmp_path / "killed")
+    assert same(bits(whole), bits(resumed))
+    plain = Line()
+    fit(plain, SCHEDULE, tmp_path / "plain")
+    assert not same(bits(whole), bits(plain))  # there was dropout
+
+
+def test_a_training_draws_no_random_numbers_of_others(tmp_path):
+    torch.manual_seed(1)
+    expected = torch.rand(3)
+    task = Forgetful()
+    torch.manual_seed(1)
+    fit(task, SCHEDULE, tmp_path)
+    assert torch.equal(torch.rand(3), expected)
+
+
+# ---- gradient descent with momentum, in place of Adam ----
+
+DESCENT = Schedule(epochs=3, batch=4, rate=0.05, momentum=0.5, seed=5)
+
+
+def test_momentum_is_plain_gradient_descent_with_memory(tmp_path):
+    """Against the recursion v <- m v + g, w <- w - rate v, with the gradient of (w x + b - y)^2 by hand."""
+    task, seen = Line(), []
+    weight, bias = (tensor.item() for tensor in bits(task)[:2])
+    original = task.loss
+
+    def loss(network, picks, noise, progress):
+        x = torch.as_tensor(np.asarray(picks), dtype=torch.float64) / 10
+        drawn = torch.Generator()
+        drawn.set_state(noise.get_state())
+        seen.append((x, 3 * x + 0.1 * torch.randn(len(picks), 1, generator=drawn).squeeze(1).double()))
+        return original(network, picks, noise, progress)
+
+    task.loss = loss
+    fit(task, DESCENT, tmp_path)
+    speed = [0.0, 0.0]
+    for x, y in seen:
+        off = 2 * (weight * x + bias - y)
+        speed = [0.5 * v + g.item() for v, g in zip(speed, ((off * x).mean(), off.mean()))]
+        weight, bias = weight - 0.05 * speed[0], bias - 0.05 * speed[1]
+    assert [tensor.item() for tensor in bits(task)[:2]] == pytest.approx([weight, bias], rel=1e-5)
+
+
+@pytest.mark.parametrize("stop", [0, 2, 3, 7])
+def test_with_momentum_too_it_ends_with_the_same_bits(tmp_path, stop):
+    whole, resumed = Line(), Line()
+    fit(whole, DESCENT, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        fit(Line(stop, KeyboardInterrupt()), DESCENT, tmp_path / "killed")
+    fit(resumed, DESCENT, tmp_path / "killed")
+    assert same(bits(whole), bits(resumed))
+    one, other = ((tmp_path / run / CHECKPOINT) for run in ("whole", "killed"))
+    assert without_time(read(one, KIND)[1]["log"]) == without_time(read(other, KIND)[1]["log"])
+    arrays = [read(path, KIND)[0] for path in (one, other)]
+    assert arrays[0].keys() == arrays[1].keys() and same(*(list(each.values()) for each in arrays))
+    assert {name for name in arrays[0] if not name.startswith("network.")} == {
+        "sgd.momentum_buffer.line.weight",
+        "sgd.momentum_buffer.line.bias",  # the layer that is never used has none
+    }
+
+
+@pytest.mark.parametrize("was, now", [(0.0, 0.5), (0.5, 0.0), (0.5, 0.9)])
+def test_a_checkpoint_of_the_other_optimizer_is_refused(tmp_path, was, now):
+    fit(Line(), Schedule(**vars(DESCENT) | {"momentum": was}), tmp_path)
+    before = (tmp_path / CHECKPOINT).read_bytes()
+    with pytest.raises(CheckpointError, match=f"another run .momentum: {was} then, {now} now"):
+        fit(Line(), Schedule(**vars(DESCENT) | {"momentum": now}), tmp_path)
+    assert (tmp_path / CHECKPOINT).read_bytes() == before
+
+
+def test_arrays_of_the_other_optimizer_are_named(tmp_path):
+    """A file that says it is of gradient descent and holds what Adam keeps."""
+    fit(Line(), Schedule(**vars(DESCENT) | {"momentum": 0.0}), tmp_path)
+    tensors, facts = read(tmp_path / CHECKPOINT, KIND)
+    about = facts["about"] | {"momentum": DESCENT.momentum}
+    write(tmp_path / CHECKPOINT, tensors, KIND, {"about": about, "log": facts["log"]})
+    task = Line()
+    before = [tensor.clone() for tensor in bits(task)]
+    with pytest.raises(CheckpointError, match="as 'adam.exp_avg.line.bias'; expected nothing"):
+        fit(task, DESCENT, tmp_path)
+    assert same(bits(task), before)
 
 
 # ---- checkpoints ----

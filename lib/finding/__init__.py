@@ -4,6 +4,10 @@
     found = find_stump(cloud)                   found.stump, and what it was made of on the way
     solve(inside, target), greedy(...)          the matrices alone, for primitives that are known
 
+The modules picture_* do the same for pictures and programs of the plane: known programs that are nearest to a picture
+(picture_nearest), the best of a network's answers (picture_choice), and better numbers for them (picture_refining).
+primitive_detection counts their primitives as detected objects. They are imported by their names.
+
 A cloud in which nothing can be found raises CloudError, a search that cannot start SearchError.
 """
 

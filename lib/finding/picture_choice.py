@@ -7,7 +7,8 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from lib.interpreters.csg import execute_many, vocabulary_of
-from lib.metrics.images import BLANK_PX, image_chamfer, iou
+from lib.interpreters.csg.packing import SIDE
+from lib.metrics.images import image_chamfer, iou
 
 CANVASES_AT_ONCE = {2: 4096, 3: 64}  # little enough for memory
 
@@ -33,11 +34,15 @@ def best_of(targets: Bool[Tensor, "n *canvas"], tokens: Int[Tensor, "n k length"
     """The program nearest to each target: of least Chamfer distance in the plane, of greatest IoU in space.
 
     targets  images (64, 64) or grids (64, 64, 64);  tokens  k programs for each, in the networks' vocabulary
-    Of equal ones the first. Raises ValueError where targets and programs are not equally many.
+    Of equal ones the first. Raises ValueError where these are not k programs, one or more, for each target, and for
+    targets that are not bool; ProgramError, which is one, for numbers that are no tokens.
     """
-    if len(targets) != len(tokens) or targets.ndim not in (3, 4):
-        found = f"targets {tuple(targets.shape)} and programs {tuple(tokens.shape)}"
+    canvases, programs = (tuple(getattr(each, "shape", ())) for each in (targets, tokens))
+    if canvases[1:] not in ((SIDE,) * 2, (SIDE,) * 3) or len(programs) != 3 or programs[0] != canvases[0]:
+        found = f"targets {canvases} and programs {programs}"
         raise ValueError(f"found {found}; expected (n, 64, 64) or (n, 64, 64, 64), and (n, k, length)")
+    if not programs[1]:
+        raise ValueError("found 0 programs for each target; expected 1 or more")
     dimensions = targets.ndim - 1
     step = max(1, CANVASES_AT_ONCE[dimensions] // tokens.shape[1])
     parts = zip(targets.split(step), tokens.split(step))
@@ -51,5 +56,4 @@ def _measured(targets: Tensor, tokens: Tensor, dimensions: int) -> Float[Tensor,
     repeated = targets.repeat_interleave(tokens.shape[1], 0)
     if dimensions == 3:
         return iou(repeated, shapes.grids, dims=3).view(tokens.shape[:2])
-    found = image_chamfer(repeated, shapes.images).masked_fill(~shapes.valid, BLANK_PX)
-    return found.view(tokens.shape[:2])
+    return image_chamfer(repeated, shapes.images).view(tokens.shape[:2])  # what is not valid is blank

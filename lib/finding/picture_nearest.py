@@ -17,6 +17,7 @@ from torch import Tensor
 from tqdm import tqdm
 
 from lib.interpreters.csg import Vocabulary, execute_many
+from lib.interpreters.csg.packing import SIDE
 
 BLOCK = 64  # targets with about as many pixels ON, searched together
 WORDS_AT_ONCE = 1 << 18  # words compared in one go: what a core's cache holds
@@ -47,20 +48,30 @@ def nearest(
 ) -> Nearest:
     """The nearest of m programs for each of n targets, which are packed as `Shapes.words` are.
 
-    Of equally near ones, one with about as many pixels ON as the target. Shows progress. Raises ValueError for no
-    programs, and for targets of another size than the vocabulary's canvases.
+    Of equally near ones, one with about as many pixels ON as the target. Works on the CPU and shows progress. Programs
+    that are not valid are blank. Raises ValueError for no programs, and for targets that are no packed canvases of the
+    vocabulary's dimension; ProgramError, which is one, for what are no tokens.
     """
-    width = vocabulary.canvases().shape[1]
-    if not len(tokens) or targets.shape[1] != width:
-        found = f"{len(tokens)} programs and targets of {targets.shape[1]} words"
-        raise ValueError(f"found {found}; expected one program or more, and targets of {width}")
-    known = _sorted(tokens, vocabulary)
-    on = _bits(targets.numpy())
-    index, pixels = torch.empty(len(targets), dtype=torch.long), torch.empty(len(targets), dtype=torch.long)
-    blocks = torch.from_numpy(np.argsort(on, kind="stable")).split(BLOCK)
-    for rows in tqdm(blocks, desc="nearest neighbours", leave=False, disable=None):
-        index[rows], pixels[rows] = _nearest(targets[rows].numpy(), on[rows], known)
-    return Nearest(known.order[index], pixels)
+    _check(targets, tokens, vocabulary)
+    known = _sorted(tokens.cpu(), vocabulary)
+    packed = targets.contiguous().numpy(force=True)
+    on = _bits(packed)
+    by_size = np.argsort(on, kind="stable")
+    index, pixels = np.zeros(len(packed), dtype=np.int64), np.zeros(len(packed), dtype=np.int64)
+    starts = range(0, len(packed), BLOCK)
+    for start in tqdm(starts, desc="nearest neighbours", leave=False, disable=None):
+        rows = by_size[start : start + BLOCK]
+        index[rows], pixels[rows] = _nearest(packed[rows], on[rows], known)
+    return Nearest(known.order[torch.from_numpy(index)], torch.from_numpy(pixels))
+
+
+def _check(targets: Tensor, tokens: Tensor, vocabulary: Vocabulary) -> None:
+    words = SIDE ** (vocabulary.dimensions - 1)
+    if targets.ndim != 2 or targets.shape[1] != words or targets.dtype != torch.int64:
+        found = f"targets {tuple(targets.shape)} of {targets.dtype}"
+        raise ValueError(f"found {found}; expected packed canvases (n, {words}) of torch.int64: shapes.words")
+    if not len(tokens):
+        raise ValueError("found no programs; expected 1 or more")
 
 
 def _bits(words: Int[np.ndarray, "*n words"]) -> Int[np.ndarray, "*n"]:
@@ -78,17 +89,17 @@ def _sorted(tokens: Tensor, vocabulary: Vocabulary) -> _Known:
 
 def _nearest(
     targets: Int[np.ndarray, "n words"], on: Int[np.ndarray, " n"], known: _Known
-) -> tuple[Tensor, Tensor]:
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
     """Places among the known and differing pixels, for some targets with similar numbers of pixels."""
     index, pixels = np.zeros(len(targets), dtype=np.int64), np.full(len(targets), FAR)
     step = DRAWN_AT_ONCE[known.vocabulary.dimensions]
     low = high = int(np.searchsorted(known.on, on[len(on) // 2])) // step * step
     while True:
         # How much nearer than now the next programs below and above could be, for any target.
-        gain_below = (pixels - (on - known.on[low - 1])).max() if low > 0 else 0
-        gain_above = (pixels - (known.on[high] - on)).max() if high < len(known.on) else 0
+        gain_below = (pixels - (on - known.on[low - 1]).clip(0)).max() if low > 0 else 0
+        gain_above = (pixels - (known.on[high] - on).clip(0)).max() if high < len(known.on) else 0
         if max(gain_below, gain_above) <= 0:
-            return torch.from_numpy(index), torch.from_numpy(pixels)
+            return index, pixels
         start = low - step if gain_below > gain_above else high
         low, high = min(low, start), max(high, start + step)
         words = execute_many(known.tokens[start : start + step], known.vocabulary).words.numpy()

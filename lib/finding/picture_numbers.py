@@ -7,14 +7,16 @@ import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
 
-from lib.interpreters.csg import Operation, Primitive, Program
+from lib.interpreters.csg import Operation, Primitive, Program, ProgramError
 from lib.interpreters.csg.machine import run
 from lib.interpreters.csg.packing import unpack
 from lib.interpreters.csg.primitives import draw_numbers
+from lib.interpreters.quoting import quoted
 
 KINDS = "cst"  # circle, square, triangle
 OPERATIONS = "+*-"
 CENTERS, SIZES = (8, 56), (8, 32)  # what numbers may be: the range of the networks' vocabulary
+DIGITS = torch.tensor([2**14, 2**7, 1])  # a primitive's numbers as one number, which is quick to sort
 
 
 @dataclass(frozen=True)
@@ -44,21 +46,14 @@ class NumberedPrograms:
     def words(self) -> Int[Tensor, "n 64"]:
         """The packed pictures. Each different primitive is drawn once."""
         there = self.kinds >= 0
-        each = torch.cat([self.kinds[there].unsqueeze(1), self.numbers[there]], 1)
-        distinct, which = each.unique(dim=0, return_inverse=True)
-        canvases = torch.empty((len(distinct), 64), dtype=torch.int64)
-        for kind, letters in enumerate(KINDS):
-            canvases[distinct[:, 0] == kind] = draw_numbers(letters, distinct[distinct[:, 0] == kind, 1:])
+        canvases, which = _drawn(self.kinds[there], self.numbers[there])
         slot = torch.zeros_like(self.kinds)
         slot[there] = which
         primitive = slot.gather(1, (-1 - self.tokens).clamp(min=0))
-        return run(torch.where(self.tokens < 0, primitive, len(distinct) + self.tokens), canvases)[0]
+        return run(torch.where(self.tokens < 0, primitive, len(canvases) + self.tokens), canvases)[0]
 
     def images(self) -> Bool[Tensor, "n 64 64"]:
         return unpack(self.words())
-
-    def unpacked(self, words: Int[Tensor, "k 64"]) -> Bool[Tensor, "k 64 64"]:
-        return unpack(words)
 
     def programs(self) -> list[Program]:
         """The programs with their present numbers."""
@@ -77,8 +72,21 @@ class NumberedPrograms:
         return Program(tuple(statements))
 
 
+def _drawn(kinds: Int[Tensor, " k"], numbers: Int[Tensor, "k 3"]) -> tuple[Tensor, Int[Tensor, " k"]]:
+    """The canvases of the different ones among primitives, and which of them each is."""
+    codes, which = (kinds * 2**21 + numbers @ DIGITS).unique(return_inverse=True)
+    canvases = torch.empty((len(codes), 64), dtype=torch.int64)
+    for kind, letters in enumerate(KINDS):
+        these = codes // 2**21 == kind
+        canvases[these] = draw_numbers(letters, codes[these].unsqueeze(1) // DIGITS % 2**7)
+    return canvases, which
+
+
 def numbered(programs: Sequence[Program]) -> NumberedPrograms:
-    """Programs of the plane, of any lengths, as tensors."""
+    """Programs of the plane, of any lengths, as tensors. Raises ProgramError for anything else."""
+    for program in programs:
+        if not isinstance(program, Program) or program.dimensions != 2:
+            raise ProgramError(f"found {quoted(str(program))}", expected="Programs of the plane")
     length = max(map(len, programs), default=1)
     most = (length + 1) // 2
     tokens = torch.full((len(programs), length), len(OPERATIONS))

@@ -27,13 +27,17 @@ def refine_by_powell(
     """The program with better numbers, and its Chamfer distance to the target, px, before and after each iteration.
 
     iterations  of Powell's method, at most; None: until they gain less than TOLERANCE
+    Raises ProgramError for what is no Program of the plane, ValueError for a target that is no bool image and for less
+    than 0 iterations.
     """
+    if iterations is not None and iterations < 0:
+        raise ValueError(f"found {iterations} iterations; expected 0 or more, or None")
     start = numbered([program])
     first = image_chamfer(target[None], start.images()).item()
-    best: list = [
-        first,
-        start,
-    ]  # what the search has met: its own answer may lie between two steps of the landscape
+    if iterations == 0:  # SciPy would make one
+        return program, [first]
+    # What the search has met: its own answer may lie between two steps of the landscape.
+    best: list = [first, start]
     distances = [first]
 
     def distance(vector: np.ndarray) -> float:

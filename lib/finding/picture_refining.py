@@ -7,7 +7,7 @@ of the picture closer to that of a target. The distance changes in jumps, so the
     refine_by_powell(program, target)  Powell's method, as in the paper: `picture_powell`
 
 A sweep of the coordinate search goes through the places of a program. At each it tries to move what stands there, a
-primitive or all primitives of an operation, by 1, 2, 4 or 8 pixels along x or y; a primitive is also made larger or
+primitive or all primitives of an operation, by 1, 2, 4, 8 or 16 pixels along x or y; a primitive is also made larger or
 smaller, around its center or away from one side, one above or one corner of it. All moves of all programs are drawn as
 one batch; those that change nothing on the canvas are not measured; the best, if it is better, is kept.
 """
@@ -20,13 +20,14 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from tqdm import tqdm
 
-from lib.interpreters.csg import Program, ProgramError
+from lib.interpreters.csg import Program
+from lib.interpreters.csg.packing import unpack
 from lib.interpreters.threads import one_thread
-from lib.metrics.images import image_chamfer
 
 from .picture_numbers import NumberedPrograms, numbered
+from .picture_targets import Targets, targets_of
 
-STEPS = (8, 4, 2, 1)  # pixels
+STEPS = (16, 8, 4, 2, 1)  # pixels
 # What a move does to x, y and r of a primitive.
 SHIFTS = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
 SIZES = tuple((x, y, r) for r in (1, -1) for x, y in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)))
@@ -52,18 +53,21 @@ def refine(
 
     Centers stay in 8..56 and sizes in 8..32, as in the networks' vocabulary, but at every whole number.
     sweeps  how many at most; None: until none is better
-    Raises ProgramError for programs of space, ValueError where programs and targets are not equally many.
+    Works on the CPU. Raises ProgramError for what are no Programs of the plane, ValueError where these and the targets
+    are not equally many, and for targets that are no bool images.
     """
-    _check(programs, targets)
-    now = numbered(programs)
-    distance = image_chamfer(targets, now.images()) if len(programs) else torch.zeros(0)
-    distances, history = [distance], [now.numbers]
+    if len(programs) != len(targets):
+        raise ValueError(f"found {len(programs)} programs and {len(targets)} targets; expected one for each")
+    if sweeps is not None and sweeps < 0:
+        raise ValueError(f"found {sweeps} sweeps; expected 0 or more, or None")
+    now, known = numbered(programs), targets_of(targets)
     active = torch.arange(len(programs))
+    distances, history = [known.chamfer(active, now.images())], [now.numbers]
     bar = tqdm(range(MOST_SWEEPS if sweeps is None else sweeps), desc="refining", leave=False, disable=None)
     for _ in bar:
         if not len(active):
             break
-        better, found = _sweep(now.rows(active), targets[active], distances[-1][active])
+        better, found = _sweep(now.rows(active), known.rows(active), distances[-1][active])
         numbers, distance = now.numbers.clone(), distances[-1].clone()
         numbers[active], distance[active] = better.numbers, found
         now = replace(now, numbers=numbers)
@@ -73,25 +77,16 @@ def refine(
     return Refined(now.programs(), torch.stack(distances), history)
 
 
-def _check(programs: Sequence[Program], targets: Tensor) -> None:
-    if len(programs) != len(targets):
-        raise ValueError(f"found {len(programs)} programs and {len(targets)} targets; expected one for each")
-    for program in programs:
-        if not isinstance(program, Program) or program.dimensions != 2:
-            raise ProgramError(f"found {program!r:.60}", expected="Programs of the plane")
-
-
 def _sweep(
-    now: NumberedPrograms, targets: Bool[Tensor, "n 64 64"], distance: Float[Tensor, " n"]
+    now: NumberedPrograms, targets: Targets, distance: Float[Tensor, " n"]
 ) -> tuple[NumberedPrograms, Float[Tensor, " n"]]:
     """One pass over the places of every program."""
     for place in range(now.tokens.shape[1]):
         tried = _moves(now, place)
         best, least = _best(now, tried, targets, distance)
-        now = replace(
-            now, numbers=torch.where((least < distance - LEAST_GAIN).view(-1, 1, 1), best, now.numbers)
-        )
-        distance = torch.minimum(distance, least)
+        better = least < distance - LEAST_GAIN
+        now = replace(now, numbers=torch.where(better.view(-1, 1, 1), best, now.numbers))
+        distance = torch.where(better, least, distance)
     return now, distance
 
 
@@ -111,7 +106,7 @@ def _moves(now: NumberedPrograms, place: int) -> Int[Tensor, "n moves primitives
 def _best(
     now: NumberedPrograms,
     tried: Int[Tensor, "n moves primitives 3"],
-    targets: Bool[Tensor, "n 64 64"],
+    targets: Targets,
     distance: Float[Tensor, " n"],
 ) -> tuple[Int[Tensor, "n primitives 3"], Float[Tensor, " n"]]:
     """The best numbers of those that were tried for each program, and their distance; its own where nothing changes."""
@@ -119,14 +114,17 @@ def _best(
     row = torch.arange(n).repeat_interleave(moves)
     same = (tried == now.numbers.unsqueeze(1)).flatten(2).all(2).flatten()
     row, numbers = row[~same], tried.flatten(0, 1)[~same]
-    words = replace(now.rows(row), numbers=numbers).words()
-    changed = (words != now.words()[row]).any(1)
+    drawn = replace(now.rows(torch.cat([torch.arange(n), row])), numbers=torch.cat([now.numbers, numbers]))
+    own, words = drawn.words().tensor_split([n])
+    changed = (words != own[row]).any(1)
     row, numbers, words = row[changed], numbers[changed], words[changed]
     if not len(row):
         return now.numbers, distance
-    found = image_chamfer(targets[row], now.unpacked(words))
+    found = targets.chamfer(row, unpack(words))
     least = distance.scatter_reduce(0, row, found, "amin")
+    place = torch.where(found == least[row], torch.arange(len(row)), len(row))
+    first = torch.full((n,), len(row)).scatter_reduce(0, row, place, "amin")  # of equally good ones
+    better = first < len(row)
     best = now.numbers.clone()
-    winner = (found == least[row]).nonzero().squeeze(1).flip(0)  # of equal ones the first: it is written last
-    best[row[winner]] = numbers[winner]
+    best[better] = numbers[first[better]]
     return best, least

@@ -23,22 +23,41 @@ def detection_precision(
 ) -> dict[str, float]:
     """Average precision of each kind of primitive in the plane, by name, and their mean, 0 to 1; by IoU 0.5 of boxes.
 
-    Raises ValueError where there is no true primitive of a kind.
+    beams  k programs for each picture;  truth  the program that drew it
+    Raises ValueError where these are not tokens of so many programs, of a vocabulary of the plane, and where there is
+    no true primitive of a kind.
     """
+    _check(beams, truth, vocabulary)
     boxes = primitive_boxes(vocabulary)
     kinds = torch.tensor([list(KINDS).index(primitive.kind) for primitive in vocabulary.primitives])
-    present, frequency = (_frequencies(tokens, len(kinds)) for tokens in (truth.unsqueeze(1), beams))
+    present, frequency = (_frequencies(tokens, vocabulary.stop) for tokens in (truth.unsqueeze(1), beams))
     found = {}
     for kind, name in enumerate(KINDS.values()):
-        picture, primitive = (frequency * (kinds == kind)).nonzero(as_tuple=True)
-        detected = Boxes(picture, boxes[primitive], frequency[picture, primitive])
         picture, primitive = (present * (kinds == kind)).nonzero(as_tuple=True)
-        found[name] = average_precision(detected, Boxes(picture, boxes[primitive]))
+        if not len(picture):
+            raise ValueError(f"found no {name} in any true program; expected 1 or more of each kind")
+        true = Boxes(picture, boxes[primitive])
+        picture, primitive = (frequency * (kinds == kind)).nonzero(as_tuple=True)
+        found[name] = average_precision(Boxes(picture, boxes[primitive], frequency[picture, primitive]), true)
     return found | {"mean": sum(found.values()) / len(found)}
 
 
+def _check(beams: Tensor, truth: Tensor, vocabulary: Vocabulary) -> None:
+    if beams.ndim != 3 or not beams.shape[1] or truth.ndim != 2 or len(beams) != len(truth):
+        found = f"programs {tuple(beams.shape)} and true ones {tuple(truth.shape)}"
+        raise ValueError(f"found {found}; expected (n, k, length) and (n, length)")
+    for tokens in (beams, truth):
+        if tokens.dtype != torch.int64 or ((tokens < 0) | (tokens > vocabulary.stop)).any():
+            raise ValueError(f"found other tokens than 0 to {vocabulary.stop} of torch.int64")
+
+
 def primitive_boxes(vocabulary: Vocabulary) -> Float[Tensor, "primitives 4"]:
-    """The box around the pixels of each primitive of the plane: left, top, right, bottom, px."""
+    """The box around the pixels of each primitive: left, top, right, bottom, px.
+
+    Raises ValueError for a vocabulary of space.
+    """
+    if vocabulary.dimensions != 2:
+        raise ValueError(f"found {vocabulary}; expected a vocabulary of the plane")
     images = unpack(vocabulary.canvases())
     spans = []
     for axis in (1, 2):  # which columns have a pixel, which rows
@@ -48,8 +67,9 @@ def primitive_boxes(vocabulary: Vocabulary) -> Float[Tensor, "primitives 4"]:
     return torch.stack([left, top, right, bottom], 1).float()
 
 
-def _frequencies(tokens: Int[Tensor, "n k length"], primitives: int) -> Float[Tensor, "n primitives"]:
-    """In which share of its k programs each primitive stands."""
-    there = torch.zeros((*tokens.shape[:2], primitives + 4), dtype=torch.bool)
+def _frequencies(tokens: Int[Tensor, "n k length"], stop: int) -> Float[Tensor, "n primitives"]:
+    """In which share of its k programs, which end at the first `$`, each primitive stands."""
+    tokens = tokens.masked_fill((tokens == stop).cumsum(2) > 0, stop)
+    there = torch.zeros((*tokens.shape[:2], stop + 1), dtype=torch.bool)
     there.scatter_(2, tokens, True)
-    return there[..., :primitives].float().mean(1)
+    return there[..., : stop - 3].float().mean(1)

@@ -10,7 +10,6 @@ concatenation, at a third of the work. START, what comes before the first token,
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -50,8 +49,8 @@ class CSGNetConfig:
         lists = (self.channels, self.kernels, self.strides, self.pools)
         if self.dimensions not in (2, 3) or len({*map(len, lists)}) != 1:
             raise ValueError(f"found {self}; expected 2 or 3 dimensions, and lists of one length")
-        if min(self.tokens - 3, self.embedding, self.hidden, *(min(each, default=0) for each in lists)) < 1:
-            raise ValueError(f"found {self}; expected sizes of at least 1, and 4 tokens")
+        if min(self.tokens - 4, self.embedding, self.hidden, *(min(each, default=0) for each in lists)) < 1:
+            raise ValueError(f"found {self}; expected sizes of at least 1, and 5 tokens")
         if any(kernel < stride or (kernel - stride) % 2 and stride > 1 for kernel, stride in self.windows):
             raise ValueError(f"found {self}; expected kernels as wide as strides, or wider by an even number")
         if self.norm not in NORMS:
@@ -76,7 +75,7 @@ class CSGNetConfig:
         return self.channels[-1] * side**self.dimensions
 
     @classmethod
-    def paper(cls, dimensions: int = 2) -> Self:
+    def paper(cls, dimensions: int = 2) -> "CSGNetConfig":
         """The paper's sizes: Tables 6 and 7 for the plane, 8 and 9 for space."""
         if dimensions == 2:
             return cls()
@@ -84,13 +83,13 @@ class CSGNetConfig:
         return cls(3, 6635, channels, (4, 4, 3, 3, 3), ones, twos, "batch", hidden=1500)
 
     @classmethod
-    def compact(cls, dimensions: int = 2) -> Self:
+    def compact(cls, dimensions: int = 2) -> "CSGNetConfig":
         """Sizes that train on two cores: convolutions that stride instead of pooling, and a smaller GRU."""
         if dimensions == 2:
             channels, kernels, strides = (16, 32, 64, 64, 16), (4, 4, 4, 3, 1), (2, 2, 2, 1, 1)
             return cls(2, 400, channels, kernels, strides, (1,) * 5, "batch", 64, 496, 0.0)
         channels, kernels, strides = (32, 48, 64, 96, 16), (4, 4, 3, 2, 1), (4, 2, 1, 2, 1)
-        return cls(3, 6635, channels, kernels, strides, (1,) * 5, "group", 32, 224, 0.0)
+        return cls(3, 6635, channels, kernels, strides, (1,) * 5, "batch", 32, 224, 0.0)
 
 
 @dataclass(frozen=True)

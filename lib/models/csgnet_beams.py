@@ -5,23 +5,23 @@ A program that has ended stays as it is and competes with its probability. Proba
 
 Beginnings that leave the same parts on the stack, whichever operand of a union or an intersection came first, have the
 same continuations and draw the same pictures; only the likelier one is kept, so that the k programs are k different
-ones. To tell them, every part has a number (a hash) made of its operation and its operands' numbers.
+ones. A part is written as a tuple, (primitive,) or (operation, operand, operand), the same for either order.
 
 The authors' search multiplies probabilities, does not end at `$` and keeps duplicates.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Bool, Float, Int
-from torch import Tensor
+from torch import Tensor, nn
 
 from .csgnet import CSGNet, State
 from .csgnet_decoding import log_odds
-from .csgnet_grammar import LONGEST, OPERATION, PRIMITIVE, allowed, deeper, kinds
+from .csgnet_grammar import LONGEST, OPERATIONS, allowed, deeper
 
 SPARE = 3  # times as many candidates as are kept: what is merged leaves room for others
-_FACTORS = (-7046029254386353131, 1442695040888963407, 3935559000370003845)  # large odd numbers, for hashing
+Stack = tuple[tuple, ...]  # parts, bottom first
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Beams:
     """The programs found for each shape, the likeliest first.
 
     tokens           (shapes, k, length) padded with `$`
-    log_probability  (shapes, k) of each program; -inf where there were fewer than k
+    log_probability  (shapes, k) of each program; -inf, and nothing but `$`, where there were fewer than k
     """
 
     tokens: Int[Tensor, "shapes k length"]
@@ -37,14 +37,25 @@ class Beams:
 
 
 @dataclass(frozen=True)
-class _Search:
-    """k beginnings of each shape: tokens, log probability, number of parts, whether not ended, the parts' hashes."""
+class _Beginnings:
+    """k of each shape: tokens (START first), log probability, number of parts, whether not ended.
+
+    A log probability of -inf says that there is none; so it is for all but one before the first token.
+    """
 
     tokens: Int[Tensor, "shapes k written"]
     total: Float[Tensor, "shapes k"]
     depth: Int[Tensor, "shapes k"]
     running: Bool[Tensor, "shapes k"]
-    parts: Int[Tensor, "shapes k room"]
+
+
+@dataclass(frozen=True)
+class _Candidates:
+    """Beginnings with one token more, the likeliest first: which beginning, which token, log probability."""
+
+    parent: Int[Tensor, "shapes some"]
+    token: Int[Tensor, "shapes some"]
+    total: Float[Tensor, "shapes some"]
 
 
 @torch.no_grad()
@@ -67,108 +78,98 @@ def beam_search(
     longest = LONGEST[network.config.dimensions] if longest is None else longest
     if k < 1 or longest < 1:
         raise ValueError(f"found {k} programs of {longest} tokens; expected at least one of each")
-    shapes, device = len(canvases), canvases.device
-    search = _Search(
-        torch.full((shapes, 1, 1), network.start, device=device),
-        torch.zeros((shapes, 1), device=device),
-        torch.zeros((shapes, 1), dtype=torch.long, device=device),
-        torch.ones((shapes, 1), dtype=torch.bool, device=device),
-        torch.zeros((shapes, 1, longest + 2), dtype=torch.long, device=device),
-    )
-    state = network.begin(canvases)
-    for room in range(longest, -1, -1):
+    state, search = network.begin(canvases), _start(network, canvases, k)
+    stacks: list[list[Stack]] = [[()] * k for _ in canvases]
+    for room in range(longest, 0, -1):
         odds, state = _continued(network, search, state, room, grammar)
-        row = (
-            search.running.flatten().cumsum(0) - 1
-        )  # of the state, which has rows for running beginnings only
-        search, parent = _kept(search, odds, k, grammar and merge)
-        state = state[row[parent[search.running]]]
+        if grammar and merge:
+            candidates, stacks = _merged(_likeliest(odds, SPARE * k), stacks, k, network.stop)
+        else:
+            candidates = _likeliest(odds, k)
+        row = (search.running.flatten().cumsum(0) - 1).view_as(
+            search.running
+        )  # which row of the state each has
+        search = _followed(search, candidates, network.config.tokens)
         if not search.running.any():
             break
-    return Beams(search.tokens[:, :, 1:], search.total)
+        state = state[row.gather(1, candidates.parent)[search.running]]
+    else:  # no room is left: what has not ended ends here, and this is no choice
+        search = replace(search, tokens=nn.functional.pad(search.tokens, (0, 1), value=network.stop))
+    none = search.total.isneginf().unsqueeze(-1)
+    return Beams(search.tokens[:, :, 1:].masked_fill(none, network.stop), search.total)
+
+
+def _start(network: CSGNet, canvases: Bool[Tensor, "shapes *canvas"], k: int) -> _Beginnings:
+    """Before the first token."""
+    zero = torch.zeros((len(canvases), k), dtype=torch.long, device=canvases.device)
+    first = torch.arange(k, device=canvases.device).expand_as(zero) == 0
+    total = torch.where(first, 0.0, -torch.inf)
+    return _Beginnings((zero + network.start).unsqueeze(-1), total, zero, first)
 
 
 def _continued(
-    network: CSGNet, search: _Search, state: State, room: int, grammar: bool
+    network: CSGNet, search: _Beginnings, state: State, room: int, grammar: bool
 ) -> tuple[Float[Tensor, "shapes k tokens"], State]:
     """Log probability of each beginning with each token after it; the network is asked about the running ones only."""
-    running, tokens = search.running, network.config.tokens
-    odds = torch.full((*running.shape, tokens), -torch.inf, device=running.device)
-    odds[..., network.stop] = 0  # what has ended goes on with `$`, and costs nothing
-    scores, state = network.advance(state, search.tokens[:, :, -1][running].unsqueeze(1))
-    depth = search.depth[running]
+    running, tokens = search.running.flatten().nonzero().squeeze(1), network.config.tokens
+    before, depth = search.tokens[:, :, -1].flatten()[running], search.depth.flatten()[running]
+    scores, state = network.advance(state, before.unsqueeze(1))
     rule = allowed(depth, torch.ones_like(depth, dtype=torch.bool), room, tokens) if grammar else None
-    going_on = log_odds(scores[:, 0], rule)
-    if room == 0:  # the end of every program, also of those that are none
-        going_on[:, : network.stop] = -torch.inf
-    odds[running] = going_on
-    return odds + search.total.unsqueeze(-1), state
+    odds = scores.new_full((search.running.numel(), tokens), -torch.inf, dtype=torch.float)
+    odds[:, network.stop] = 0  # what has ended goes on with `$`, and costs nothing
+    odds[running] = log_odds(scores[:, 0], rule)
+    return odds.view(*search.running.shape, tokens) + search.total.unsqueeze(-1), state
 
 
-def _kept(
-    search: _Search, odds: Float[Tensor, "shapes k tokens"], k: int, merge: bool
-) -> tuple[_Search, Int[Tensor, "shapes kept"]]:
-    """The k likeliest continuations of each shape, and which of all beginnings each continues."""
-    tokens = odds.shape[-1]
-    stop = tokens - 1
-    total, place = odds.flatten(1).topk(min((SPARE if merge else 1) * k, odds[0].numel()), 1)
-    parent, token = place // tokens, place % tokens
-    if merge:
-        parts = _pushed(_rows(search.parts, parent), search.depth.gather(1, parent), token, tokens)
-        total = total.masked_fill(_repeated(parts, token == stop), -torch.inf)
-        total, order = total.topk(min(k, total.shape[1]), 1)
-        parent, token, parts = parent.gather(1, order), token.gather(1, order), _rows(parts, order)
-    else:
-        parts = _rows(search.parts, parent)
-    written = torch.cat([_rows(search.tokens, parent), token.unsqueeze(-1)], -1)
+def _likeliest(odds: Float[Tensor, "shapes k tokens"], some: int) -> _Candidates:
+    """So many of all continuations of each shape's beginnings; all, where there are fewer."""
+    tokens = odds.shape[2]
+    total, place = odds.flatten(1).topk(min(some, odds.shape[1] * tokens), 1)
+    return _Candidates(place // tokens, place % tokens, total)
+
+
+def _merged(
+    candidates: _Candidates, stacks: list[list[Stack]], k: int, stop: int
+) -> tuple[_Candidates, list[list[Stack]]]:
+    """The first k candidates of each shape with different parts, and these parts; stacks: of the beginnings."""
+    possible = (~candidates.total.isneginf()).sum(1).tolist()
+    rows = zip(stacks, candidates.parent.tolist(), candidates.token.tolist(), possible)
+    found = [_different(stack, parents[:n], tokens, k, stop) for stack, parents, tokens, n in rows]
+    column = [[*each.values()] + [-1] * (k - len(each)) for each in found]
+    place = torch.tensor(column, dtype=torch.long, device=candidates.total.device).view(-1, k)
+    parent, token, total = (each.gather(1, place.clamp(min=0)) for each in vars(candidates).values())
+    total = total.masked_fill(place < 0, -torch.inf)
+    return _Candidates(parent, token, total), [[*each, *[()] * (k - len(each))] for each in found]
+
+
+def _different(
+    stacks: list[Stack], parents: list[int], tokens: list[int], k: int, stop: int
+) -> dict[Stack, int]:
+    """Of one shape's candidates the first k with different parts: their parts, and which candidates they are."""
+    found: dict[Stack, int] = {}
+    for place, (parent, token) in enumerate(zip(parents, tokens)):
+        found.setdefault(_pushed(stacks[parent], token, stop), place)
+        if len(found) == k:
+            break
+    return found
+
+
+def _pushed(stack: Stack, token: int, stop: int) -> Stack:
+    """The parts after a token: + * - $ are the last of the vocabulary. Operands of + and * are sorted."""
+    if token == stop:
+        return stack
+    if token < stop - OPERATIONS:
+        return *stack, (token,)
+    *below, left, right = stack
+    if token < stop - 1:
+        left, right = sorted((left, right))
+    return *below, (token, left, right)
+
+
+def _followed(search: _Beginnings, candidates: _Candidates, tokens: int) -> _Beginnings:
+    """The candidates as beginnings."""
+    parent, token, stop = candidates.parent, candidates.token, tokens - 1
+    before = search.tokens.gather(1, parent.unsqueeze(-1).expand(-1, -1, search.tokens.shape[-1]))
     depth = deeper(search.depth.gather(1, parent), token, tokens)
-    running = search.running.gather(1, parent) & (token != stop) & (total > -torch.inf)
-    first = torch.arange(len(parent), device=parent.device).unsqueeze(1) * search.running.shape[1]
-    return _Search(written, total, depth, running, parts), parent + first
-
-
-def _rows(
-    values: Int[Tensor, "shapes k width"], which: Int[Tensor, "shapes some"]
-) -> Int[Tensor, "shapes some width"]:
-    """Some of each shape's rows."""
-    return values.gather(1, which.unsqueeze(-1).expand(-1, -1, values.shape[-1]))
-
-
-def _pushed(
-    parts: Int[Tensor, "shapes some room"],
-    depth: Int[Tensor, "shapes some"],
-    token: Int[Tensor, "shapes some"],
-    tokens: int,
-) -> Int[Tensor, "shapes some room"]:
-    """The hashes of the parts on each stack after a token; 0 where there is none."""
-    kind = kinds(tokens, token.device)[token]
-    places = torch.stack([depth - 2, depth - 1, depth], -1).clamp(min=0)
-    left, right, _ = parts.gather(2, places).unbind(-1)
-    subtracts = (
-        token == tokens - 2
-    )  # the only operation whose operands are in an order: + * - $ end the vocabulary
-    a = torch.where(subtracts, left, torch.minimum(left, right))
-    b = torch.where(subtracts, right, torch.maximum(left, right))
-    operates, draws = kind == OPERATION, kind == PRIMITIVE
-    made = _mixed(torch.where(operates, _mixed(a) + _FACTORS[1] * b, 0) + _FACTORS[0] * (token + 1))
-    left, right = torch.where(operates, made, left), torch.where(operates, 0, right)
-    parts = parts.scatter(2, places[..., 1:2], right.unsqueeze(-1)).scatter(
-        2, places[..., :1], left.unsqueeze(-1)
-    )
-    new = torch.where(draws, made, parts.gather(2, places[..., 2:]).squeeze(-1))
-    return parts.scatter(2, places[..., 2:], new.unsqueeze(-1))
-
-
-def _mixed(number: Int[Tensor, "*shape"]) -> Int[Tensor, "*shape"]:
-    """Another number, as if drawn by chance, the same for the same; int64 that overflows on purpose."""
-    number = (number ^ (number >> 29)) * _FACTORS[1]
-    return (number ^ (number >> 32)) * _FACTORS[2]
-
-
-def _repeated(
-    parts: Int[Tensor, "shapes some room"], ended: Bool[Tensor, "shapes some"]
-) -> Bool[Tensor, "shapes some"]:
-    """Which rows have the same parts as one before them, and have ended or not like it."""
-    place = torch.arange(1, parts.shape[-1] + 1, device=parts.device)
-    key = _mixed(_mixed(parts + _FACTORS[0] * place).sum(-1) + ended)
-    return (key.unsqueeze(1) == key.unsqueeze(2)).tril(-1).any(2)
+    running = search.running.gather(1, parent) & (token != stop) & ~candidates.total.isneginf()
+    return _Beginnings(torch.cat([before, token.unsqueeze(-1)], -1), candidates.total, depth, running)

@@ -46,18 +46,20 @@ def write(
     token = torch.full_like(shape, network.start)
     depth, running = torch.zeros_like(shape), torch.ones_like(shape, dtype=torch.bool)
     total, tokens = torch.zeros(len(shape), device=shape.device), []
-    for room in range(longest, -1, -1):
+    for room in range(longest, 0, -1):
         scores, state = network.advance(state, token.unsqueeze(1))
         rule = allowed(depth, running, room, network.config.tokens) if grammar else None
         odds = log_odds(scores[:, 0], rule)
         token = odds.argmax(1) if noise is None else _drawn(odds, noise)
-        token = torch.where(running & (room > 0), token, network.stop)
+        token = torch.where(running, token, network.stop)
         total = total + odds.gather(1, token.unsqueeze(1)).squeeze(1) * running
         depth = deeper(depth, token, network.config.tokens)
         running = running & (token != network.stop)
         tokens.append(token)
         if not running.any():
             break
+    else:  # no room is left: what has not ended ends here, and this is no choice: its probability is 1
+        tokens.append(torch.full_like(token, network.stop))
     return Written(torch.stack(tokens, 1), total)
 
 
@@ -66,7 +68,7 @@ def log_odds(
 ) -> Float[Tensor, "rows tokens"]:
     """Logarithms of the probabilities that scores stand for, among the tokens that the rule allows."""
     scores = scores.float()
-    return (scores if rule is None else scores.masked_fill(~rule, -torch.inf)).log_softmax(1)
+    return (scores if rule is None else scores.where(rule, -torch.inf)).log_softmax(1)
 
 
 def _drawn(odds: Float[Tensor, "rows tokens"], noise: torch.Generator) -> Int[Tensor, " rows"]:

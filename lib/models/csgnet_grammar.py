@@ -40,10 +40,15 @@ def allowed(
     primitive = running & (depth < room)
     operation = running & (depth >= 2)
     stop = ~running | (depth == 1)
-    return torch.stack([primitive, operation, stop], 1)[:, kinds(tokens, depth.device)]
+    return torch.stack([primitive, operation, stop], 1).index_select(1, kinds(tokens, depth.device))
 
 
 def deeper(depth: Int[Tensor, "*rows"], token: Int[Tensor, "*rows"], tokens: int) -> Int[Tensor, "*rows"]:
     """The number of parts after a token: a primitive is one more, an operation makes one of two."""
-    change = torch.tensor([1, -1, 0], device=depth.device)
-    return depth + change[kinds(tokens, depth.device)[token]]
+    return depth + _changes(tokens, depth.device)[token]
+
+
+@cache
+def _changes(tokens: int, device: torch.device) -> Int[Tensor, " tokens"]:
+    """What each token adds to the number of parts."""
+    return torch.tensor([1, -1, 0], device=device)[kinds(tokens, device)]

@@ -50,6 +50,7 @@ class Job:
 
     network  what is saved in the end
     data     one sentence about what it learned from
+    ready    makes the trained network what is to be saved, before it is
     finish   what else belongs to the trained network: told where its weights were saved, writes files beside them
     """
 
@@ -58,6 +59,7 @@ class Job:
     network: nn.Module
     data: str
     finish: Callable[[Path], None] = lambda weights: None
+    ready: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,7 @@ def _train(command: Command, options: argparse.Namespace, folder: Path, line: st
     log = fit(job.task, job.schedule, folder, fabric, told)
     if fabric.is_global_zero:
         path = folder / f"{options.name}.safetensors"
+        job.ready()
         save(job.network, path)
         job.finish(path)
         facts = _facts(job, log, fabric, line, options.precision)

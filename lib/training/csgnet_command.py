@@ -3,14 +3,18 @@
 import argparse
 import hashlib
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import torch
+from jaxtyping import Int
+from torch import Tensor
 
 from ..datasets.csg import TokenSet, csg_programs
 from ..models.csgnet import CSGNet, CSGNetConfig
 from .commands import Command, Job, Setting
 from .csgnet import ParseTask, Teacher
+from .csgnet_sharing import share, unshare
 from .loop import Schedule, TrainingError
 
 SETTINGS = (
@@ -26,6 +30,9 @@ SETTINGS = (
     ),
     Setting(
         "in_order", int, 1, 0, "1: operands of unions and intersections in a fixed order; 0: as they are"
+    ),
+    Setting(
+        "sharing", int, 1, 0, "1: while it learns, tokens with a number in common share weights; 0: none do"
     ),
 )
 VALIDATED = 1000  # programs that are scored after every epoch
@@ -48,6 +55,9 @@ def job(options: argparse.Namespace) -> Job:
             f"curriculum is {options.curriculum}, programs {options.programs}; "
             "expected a share from 0 to 1, and 1 or more"
         )
+    for name in ("in_order", "sharing"):
+        if (value := getattr(options, name)) not in (0, 1):
+            raise TrainingError(f"{name} is {value}; expected 0 or 1")
     names = ("epochs", "batch", "rate", "warmup", "last", "clip", "seed")
     schedule = Schedule(**{name: getattr(options, name) for name in names})
     programs = csg_programs(options.dimensions, "train")
@@ -55,9 +65,12 @@ def job(options: argparse.Namespace) -> Job:
     torch.manual_seed(options.seed)
     config = (CSGNetConfig.paper if options.paper else CSGNetConfig.compact)(options.dimensions)
     network = CSGNet(config)
+    if options.sharing:
+        share(network)
     about = {
         "dimensions": options.dimensions, "data": digest(programs), "network": asdict(config),
         "programs": options.programs, "curriculum": options.curriculum, "in_order": options.in_order,
+        "sharing": options.sharing,
         "precision": options.precision,
     }  # fmt: skip
     task = ParseTask(
@@ -69,12 +82,20 @@ def job(options: argparse.Namespace) -> Job:
         bool(options.in_order),
         about,
     )
-    return Job(task, schedule, network, programs.describe())
+    ready = partial(unshare, network) if options.sharing else Job.ready
+    return Job(task, schedule, network, programs.describe(), ready=ready)
 
 
 def evenly(programs: TokenSet, count: int) -> TokenSet:
-    """At most so many of the programs, taken at equal steps, so that lengths keep their shares."""
-    return programs[:: max(1, len(programs) // count)][:count]
+    """At most so many of the programs, spread over all, so that lengths keep their shares."""
+    some = spread(len(programs), count)
+    return TokenSet(programs.tokens[some], programs.vocabulary, programs.source, programs.name)
+
+
+def spread(total: int, count: int) -> Int[Tensor, " some"]:
+    """Places of at most `count` of `total` things, spread evenly from the first on."""
+    count = min(count, total)
+    return torch.arange(count) * total // max(1, count)
 
 
 def digest(programs: TokenSet) -> str:

@@ -204,11 +204,10 @@ class _Run:
         for group in self.optimizer.param_groups:
             group["lr"] = self.schedule.rate_at(progress)
         rank, world = self.fabric.global_rank, self.fabric.world_size
-        entropy = np.random.SeedSequence([*seed, rank]).generate_state(1)[0]
-        noise = torch.Generator().manual_seed(int(entropy))
+        entropy = int(np.random.SeedSequence([*seed, rank]).generate_state(1)[0])
         own = batch[rank::world]
         weight = len(own) * world / len(batch)  # 0 for a process that is left without an item; 1 if alone
-        loss, terms = self.task.loss(self.network, own if len(own) else batch[:1], noise, progress)
+        loss, terms = self._loss(own if len(own) else batch[:1], entropy, progress)
         self.optimizer.zero_grad()
         self.fabric.backward(loss * weight)
         norm = self.fabric.clip_gradients(
@@ -222,6 +221,14 @@ class _Run:
             )
         self.optimizer.step()
         return {name: value * weight for name, value in {"loss": loss, **terms}.items()}
+
+    def _loss(self, picks: np.ndarray, entropy: int, progress: float) -> tuple[Tensor, dict[str, Tensor]]:
+        """The task's loss, with all chance from `entropy`: also that of dropout, which has no generator of its own."""
+        noise = torch.Generator().manual_seed(entropy)
+        device = self.fabric.device
+        with torch.random.fork_rng([device] if device.type == "cuda" else []):
+            torch.manual_seed(entropy)
+            return self.task.loss(self.network, picks, noise, progress)
 
 
 def _rounded(figures: dict[str, float]) -> dict[str, float]:

@@ -12,6 +12,7 @@ The authors' program differs: it draws one program a picture, pays 0.0204 for an
 0.7 b + 0.3 mean(R) from 0 on, the present ones included, and allows 15 tokens in training.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -75,7 +76,7 @@ class ReinforceTask:
     power     of the reward, the paper's gamma
     grammar   draw only programs that can be executed; the paper does not
     about     JSON: data and settings that must be the same when a run goes on
-    Raises ValueError for a baseline that is unknown, or "image" with one program a picture.
+    Raises ValueError for a baseline that is unknown, "image" with one program a picture, and a power of 0 or less.
     """
 
     module: Actor
@@ -91,6 +92,8 @@ class ReinforceTask:
         if self.baseline not in BASELINES or self.samples < 1 + (self.baseline == "image"):
             found = f"the baseline {self.baseline!r} with {self.samples} programs a picture"
             raise ValueError(f"found {found}; expected one of {BASELINES}, and two or more for 'image'")
+        if not 0 < self.power < math.inf:
+            raise ValueError(f"found the power {self.power} of the reward; expected a number above 0")
 
     @property
     def network(self) -> nn.Module:

@@ -34,7 +34,8 @@ VALIDATED = 500  # pictures that are scored after every epoch
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Where to begin, and from which pictures to learn."""
     start = f"weights to begin with (default: those that come with the project), or {SCRATCH!r}"
-    parser.add_argument("--start", metavar="PATH", help=start)
+    # Two names: `fabric run` takes --start for an abbreviation of one of its own options.
+    parser.add_argument("--start", "--begin", metavar="PATH", help=start)
     parser.add_argument("--source", help="whose silhouettes (default: all that were made)")
     told = "what is subtracted from rewards (default: the paper's running average)"
     parser.add_argument("--baseline", choices=BASELINES, default=BASELINES[0], help=told)
@@ -47,6 +48,8 @@ def folder(options: argparse.Namespace) -> Path:
 
 def job(options: argparse.Namespace) -> Job:
     """REINFORCE on the training silhouettes; some of validation are scored after every epoch."""
+    if options.grammar not in (0, 1):
+        raise TrainingError(f"grammar is {options.grammar}; expected 0 or 1")
     names = ("epochs", "batch", "rate", "warmup", "last", "clip", "seed", "momentum")
     schedule = Schedule(**{name: getattr(options, name) for name in names})
     masks = silhouettes(options.source, "train")

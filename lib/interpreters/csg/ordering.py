@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Int
 from torch import Tensor
 
+from .errors import ProgramError
 from .vocabulary import Vocabulary
 
 Part = tuple[
@@ -20,26 +21,42 @@ Part = tuple[
 
 
 def ordered(tokens: Int[Tensor, "programs length"], vocabulary: Vocabulary) -> Int[Tensor, "programs length"]:
-    """Valid programs, padded with `$`, with operands in order."""
-    union = len(vocabulary.primitives)
-    rows = [_ordered(row, union) for row in tokens.tolist()]
+    """Programs, padded with `$`, with operands in order. Empty ones, nothing but `$`, stay as they are.
+
+    Raises ProgramError, naming the row, for what is no program.
+    """
+    if tokens.ndim != 2 or tokens.is_floating_point():
+        found = f"the tokens are a tensor {tuple(tokens.shape)} of {tokens.dtype}"
+        raise ProgramError(found, expected="whole numbers (programs, length)")
+    rows = []
+    for number, row in enumerate(tokens.tolist()):
+        try:
+            rows.append(_ordered(row, len(vocabulary.primitives)))
+        except ValueError as error:
+            raise ProgramError(f"row {number} is no program: {error}", expected="valid programs") from None
     return torch.tensor(rows, dtype=tokens.dtype, device=tokens.device).view(tokens.shape)
 
 
 def _ordered(tokens: list[int], union: int) -> list[int]:
-    """One program; from `union` on tokens are + * - and `$`."""
+    """One program; from `union` on tokens are + * - and `$`. Raises ValueError for what is none."""
     stack: list[Part] = []
     for token in tokens:
-        if token > union + 2:
+        if token == union + 3:
             break
+        if not 0 <= token < union + 3:
+            raise ValueError(f"'{token}' is not a token")
         if token < union:
             stack.append((None, ((token,),)))
             continue
+        if len(stack) < 2:
+            raise ValueError("an operation finds no two shapes")
         right, left = stack.pop(), stack.pop()
         if token == union + 2:
             stack.append((None, ((*_joined(left), *_joined(right), token),)))
         else:
             stack.append((token, (*_operands(left, token), *_operands(right, token))))
+    if len(stack) > 1:
+        raise ValueError(f"it ends with {len(stack)} shapes")
     written = _joined(stack[0]) if stack else ()
     return [*written, *tokens[len(written) :]]
 

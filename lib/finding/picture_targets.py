@@ -1,0 +1,60 @@
+"""The Chamfer distance to a few pictures, again and again: what depends on them alone is computed once.
+
+The same numbers as `image_chamfer`, in half the time. Of the two ways, from the outline of a drawn picture to that of
+its target only needs to be looked up in a table of the target; the way back depends on both.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from lib.interpreters.csg.packing import SIDE
+from lib.metrics.distances import distance_transform, distances_at
+from lib.metrics.edges import edge_map
+from lib.metrics.images import BLANK_PX
+
+AT_ONCE = 128  # pictures: what stays in the cache
+
+
+@dataclass(frozen=True)
+class Targets:
+    """n pictures: their outlines, and how far each pixel is from them, px (infinite where there is no outline)."""
+
+    outlines: Bool[Tensor, "n 64 64"]
+    away: Float[Tensor, "n 64 64"]
+
+    def rows(self, which: Int[Tensor, " some"]) -> "Targets":
+        """Some of the pictures, also repeated."""
+        return Targets(self.outlines[which], self.away[which])
+
+    def chamfer(self, which: Int[Tensor, " k"], images: Bool[Tensor, "k 64 64"]) -> Float[Tensor, " k"]:
+        """The distance of each image to the target that `which` names, px."""
+        parts = zip(which.split(AT_ONCE), images.split(AT_ONCE))
+        return torch.cat([self._chamfer(*part) for part in parts])
+
+    def _chamfer(self, which: Tensor, images: Tensor) -> Float[Tensor, " k"]:
+        edges = edge_map(images)
+        image, row, column = edges.nonzero(as_tuple=True)
+        there = _means(self.away[which[image], row, column], image, len(images))
+        back = _means(*distances_at(edges, self.outlines[which], "octagonal"), len(images))
+        blank = there.isinf() | ~edges.flatten(1).any(1)
+        return torch.where(blank, BLANK_PX, (there + back) / 2)
+
+
+def targets_of(images: Bool[Tensor, "n 64 64"]) -> Targets:
+    """What has to be known of pictures to measure distances to them.
+
+    Raises ValueError for anything but bool images of 64 x 64 pixels.
+    """
+    outlines = edge_map(images).cpu()
+    if outlines.shape[1:] != (SIDE, SIDE):
+        raise ValueError(f"found images {tuple(outlines.shape)}; expected (n, 64, 64)")
+    return Targets(outlines, distance_transform(outlines) if len(images) else torch.zeros(images.shape))
+
+
+def _means(distance: Float[Tensor, " pixels"], image: Int[Tensor, " pixels"], n: int) -> Float[Tensor, " n"]:
+    """The mean distance of each image's pixels, as the authors compute it: see `image_chamfer`."""
+    total, count = torch.bincount(image, distance, minlength=n), torch.bincount(image, minlength=n)
+    return 255 * total / (255 * count + 1)

@@ -79,16 +79,15 @@ def beam_search(
     if k < 1 or longest < 1:
         raise ValueError(f"found {k} programs of {longest} tokens; expected at least one of each")
     state, search = network.begin(canvases), _start(network, canvases, k)
-    stacks: list[list[Stack]] = [[()] * k for _ in canvases]
+    stacks: list[list[Stack]] = [[()] * k for _ in range(len(canvases))]
     for room in range(longest, 0, -1):
         odds, state = _continued(network, search, state, room, grammar)
         if grammar and merge:
             candidates, stacks = _merged(_likeliest(odds, SPARE * k), stacks, k, network.stop)
         else:
             candidates = _likeliest(odds, k)
-        row = (search.running.flatten().cumsum(0) - 1).view_as(
-            search.running
-        )  # which row of the state each has
+        # The state has rows for running beginnings only: this is which one each has.
+        row = search.running.flatten().cumsum(0).view_as(search.running) - 1
         search = _followed(search, candidates, network.config.tokens)
         if not search.running.any():
             break

@@ -588,3 +588,10 @@ def test_the_silhouettes_are_those_of_training(small, monkeypatch, tmp_path):
     monkeypatch.setattr(reinforce_command, "silhouettes", recorded)
     assert train(*QUICK, "--epochs", 1, "--out", tmp_path / "run") == 0
     assert sorted(seen) == ["train", "val"]
+
+
+def test_pictures_of_random_programs(small, tmp_path, capsys):
+    """--source synthetic: what the teacher's programs draw, without the programs."""
+    options = ["--epochs", 1, "--batch", 600, "--samples", 1, "--source", "synthetic"]
+    assert train(*options, "--out", tmp_path / "run") == 0
+    assert "Pictures of 1200 random 2D train programs" in capsys.readouterr().out

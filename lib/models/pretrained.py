@@ -19,6 +19,6 @@ def pretrained(name: str, folder: Path = FOLDER) -> Path:
         there = ", ".join(sorted(each.stem for each in Path(folder).glob("*.safetensors"))) or "none at all"
         raise CheckpointError(
             f"{path}: there are no weights called {name!r}; found {there}. They come with the repository; "
-            "`python -m lib.training program_vae` trains such a network"
+            "`python -m lib.training` trains such networks"
         )
     return path

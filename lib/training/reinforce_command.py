@@ -5,19 +5,24 @@ import hashlib
 from pathlib import Path
 
 import torch
+from jaxtyping import Bool
 from torch import Tensor
 
 from ..datasets import DataError, silhouettes
+from ..datasets.csg import csg_programs
+from ..interpreters.csg import execute_many
 from ..models.csgnet import CSGNet, CSGNetConfig
 from ..models.pretrained import pretrained
 from ..models.weights import load
 from .commands import Command, Job, Setting
+from .csgnet_command import evenly, spread
 from .loop import Schedule, TrainingError
 from .reinforce import BASELINES, Actor, ReinforceTask
 
-SCRATCH = "scratch"
+SCRATCH, SYNTHETIC = "scratch", "synthetic"
+PICTURES = 20_000  # of random programs, to learn from
 SETTINGS = (
-    Setting("epochs", int, 20, 100, "passes over the pictures"),
+    Setting("epochs", int, 8, 100, "passes over the pictures"),
     Setting("batch", int, 64, 3000, "pictures a step"),
     Setting("samples", int, 16, 1, "programs drawn for each picture"),
     Setting("rate", float, 2e-4, 0.01, "the learning rate at its highest"),
@@ -36,7 +41,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     start = f"weights to begin with (default: those that come with the project), or {SCRATCH!r}"
     # Two names: `fabric run` takes --start for an abbreviation of one of its own options.
     parser.add_argument("--start", "--begin", metavar="PATH", help=start)
-    parser.add_argument("--source", help="whose silhouettes (default: all that were made)")
+    sources = (
+        f"whose silhouettes (default: all that were made), or {SYNTHETIC!r}: pictures of random programs"
+    )
+    parser.add_argument("--source", help=sources)
     told = "what is subtracted from rewards (default: the paper's running average)"
     parser.add_argument("--baseline", choices=BASELINES, default=BASELINES[0], help=told)
 
@@ -52,28 +60,35 @@ def job(options: argparse.Namespace) -> Job:
         raise TrainingError(f"grammar is {options.grammar}; expected 0 or 1")
     names = ("epochs", "batch", "rate", "warmup", "last", "clip", "seed", "momentum")
     schedule = Schedule(**{name: getattr(options, name) for name in names})
-    masks = silhouettes(options.source, "train")
-    others = silhouettes(options.source, "val")
-    if not len(masks) or not len(others):
+    images, told = _pictures(options.source, "train", None)
+    others, _ = _pictures(options.source, "val", VALIDATED)
+    if not len(images) or not len(others):
         raise DataError(
-            f"there are {len(masks)} pictures to learn from, {len(others)} to test; expected some of both"
+            f"there are {len(images)} pictures to learn from, {len(others)} to test; expected some of both"
         )
     torch.manual_seed(options.seed)
     network, begun = _network(options)
-    images = masks.images
     about = {
         "data": _digest(images), "start": begun, "samples": options.samples, "baseline": options.baseline,
         "power": options.power, "grammar": options.grammar, "precision": options.precision,
     }  # fmt: skip
-    step = max(1, len(others) // VALIDATED)
     try:
         task = ReinforceTask(
-            Actor(network), images, others.images[::step][:VALIDATED], options.samples, options.baseline,
+            Actor(network), images, others, options.samples, options.baseline,
             options.power, bool(options.grammar), about,
         )  # fmt: skip
     except ValueError as error:
         raise TrainingError(str(error)) from error
-    return Job(task, schedule, network, masks.describe())
+    return Job(task, schedule, network, told)
+
+
+def _pictures(source: str | None, split: str, most: int | None) -> tuple[Bool[Tensor, "n 64 64"], str]:
+    """At most so many silhouettes, spread over all, or pictures of random programs; and a sentence about them."""
+    if source == SYNTHETIC:
+        programs = evenly(csg_programs(2, split), most or PICTURES)
+        return execute_many(programs.tokens).images, f"Pictures of {programs.describe()}"
+    masks = silhouettes(source, split)
+    return masks.images[spread(len(masks), most or len(masks))], masks.describe()
 
 
 def _network(options: argparse.Namespace) -> tuple[CSGNet, str]:

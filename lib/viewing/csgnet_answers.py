@@ -94,7 +94,17 @@ def boxes_figure(
                 corner = (x + left, y + top)
                 ax.add_patch(Rectangle(corner, right - left, bottom - top, alpha=float(score), **style))
                 if NAMED <= score < 1:
-                    write(ax, f"{score:.0%}", x + left + 1, y + top + 1, 6.5, ha="left", color=COLORS[kind])
+                    paper = {"facecolor": "white", "edgecolor": "none", "pad": 0.3, "alpha": 0.8}
+                    write(
+                        ax,
+                        f"{score:.0%}",
+                        x + left + 1,
+                        y + top + 1,
+                        6.5,
+                        ha="left",
+                        color=COLORS[kind],
+                        bbox=paper,
+                    )
     keys = [Line2D([], [], color=color, label=KINDS[kind].name) for kind, color in COLORS.items()]
     style = {"ncols": 3, "fontsize": 8, "frameon": False, "loc": "lower center", "borderaxespad": 0}
     ax.legend(handles=keys, bbox_to_anchor=(0.5, 0.0), **style)

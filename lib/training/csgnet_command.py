@@ -12,6 +12,7 @@ from torch import Tensor
 
 from ..datasets.csg import TokenSet, csg_programs
 from ..models.csgnet import CSGNet, CSGNetConfig
+from ..models.weights import load
 from .commands import Command, Job, Setting
 from .csgnet import ParseTask, Teacher
 from .csgnet_sharing import share, unshare
@@ -35,12 +36,16 @@ SETTINGS = (
         "sharing", int, 1, 0, "1: while it learns, tokens with a number in common share weights; 0: none do"
     ),
 )
+SCRATCH = "scratch"  # where a network begins that has learned nothing
 VALIDATED = 1000  # programs that are scored after every epoch
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Plane or space."""
+    """Plane or space, and where to begin."""
     parser.add_argument("--dimensions", type=int, choices=(2, 3), default=2, help="default: 2, the plane")
+    # Two names: `fabric run` takes --start for an abbreviation of one of its own options.
+    start = f"weights to go on from (default: {SCRATCH!r}, random ones)"
+    parser.add_argument("--start", "--begin", metavar="PATH", help=start)
 
 
 def folder(options: argparse.Namespace) -> Path:
@@ -63,15 +68,13 @@ def job(options: argparse.Namespace) -> Job:
     programs = csg_programs(options.dimensions, "train")
     others = evenly(csg_programs(options.dimensions, "val"), VALIDATED)
     torch.manual_seed(options.seed)
-    config = (CSGNetConfig.paper if options.paper else CSGNetConfig.compact)(options.dimensions)
-    network = CSGNet(config)
+    network, begun = begin(options, options.dimensions)
     if options.sharing:
         share(network)
     about = {
-        "dimensions": options.dimensions, "data": digest(programs), "network": asdict(config),
-        "programs": options.programs, "curriculum": options.curriculum, "in_order": options.in_order,
-        "sharing": options.sharing,
-        "precision": options.precision,
+        "dimensions": options.dimensions, "data": digest(programs), "network": asdict(network.config),
+        "start": begun, "programs": options.programs, "curriculum": options.curriculum,
+        "in_order": options.in_order, "sharing": options.sharing, "precision": options.precision,
     }  # fmt: skip
     task = ParseTask(
         Teacher(network),
@@ -84,6 +87,20 @@ def job(options: argparse.Namespace) -> Job:
     )
     ready = partial(unshare, network) if options.sharing else Job.ready
     return Job(task, schedule, network, programs.describe(), ready=ready)
+
+
+def begin(options: argparse.Namespace, dimensions: int) -> tuple[CSGNet, str]:
+    """The network of `--start`, or a new one; and what names its weights. Raises TrainingError, CheckpointError."""
+    if options.start in (None, SCRATCH):
+        return CSGNet((CSGNetConfig.paper if options.paper else CSGNetConfig.compact)(dimensions)), SCRATCH
+    path = Path(options.start)
+    network = load(CSGNet, path)
+    if network.config.dimensions != dimensions:
+        spaces = {2: "the plane", 3: "space"}
+        raise TrainingError(
+            f"{path}: found a network of {spaces[network.config.dimensions]}; expected one of {spaces[dimensions]}"
+        )
+    return network, hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
 def evenly(programs: TokenSet, count: int) -> TokenSet:

@@ -11,15 +11,13 @@ from torch import Tensor
 from ..datasets import DataError, silhouettes
 from ..datasets.csg import csg_programs
 from ..interpreters.csg import execute_many
-from ..models.csgnet import CSGNet, CSGNetConfig
 from ..models.pretrained import pretrained
-from ..models.weights import load
 from .commands import Command, Job, Setting
-from .csgnet_command import evenly, spread
+from .csgnet_command import SCRATCH, begin, evenly, spread
 from .loop import Schedule, TrainingError
 from .reinforce import BASELINES, Actor, ReinforceTask
 
-SCRATCH, SYNTHETIC = "scratch", "synthetic"
+SYNTHETIC = "synthetic"
 PICTURES = 20_000  # of random programs, to learn from
 SETTINGS = (
     Setting("epochs", int, 8, 100, "passes over the pictures"),
@@ -67,7 +65,8 @@ def job(options: argparse.Namespace) -> Job:
             f"there are {len(images)} pictures to learn from, {len(others)} to test; expected some of both"
         )
     torch.manual_seed(options.seed)
-    network, begun = _network(options)
+    options.start = options.start or str(pretrained("csgnet_2d"))
+    network, begun = begin(options, dimensions=2)
     about = {
         "data": _digest(images), "start": begun, "samples": options.samples, "baseline": options.baseline,
         "power": options.power, "grammar": options.grammar, "precision": options.precision,
@@ -89,17 +88,6 @@ def _pictures(source: str | None, split: str, most: int | None) -> tuple[Bool[Te
         return execute_many(programs.tokens).images, f"Pictures of {programs.describe()}"
     masks = silhouettes(source, split)
     return masks.images[spread(len(masks), most or len(masks))], masks.describe()
-
-
-def _network(options: argparse.Namespace) -> tuple[CSGNet, str]:
-    """The network to begin with, and what names it."""
-    if options.start == SCRATCH:
-        return CSGNet((CSGNetConfig.paper if options.paper else CSGNetConfig.compact)(2)), SCRATCH
-    path = Path(options.start) if options.start else pretrained("csgnet_2d")
-    network = load(CSGNet, path)
-    if network.config.dimensions != 2:
-        raise TrainingError(f"{path}: found a network of space; expected one of the plane")
-    return network, hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
 def _digest(images: Tensor) -> str:

@@ -1,6 +1,8 @@
 """CSGNet learns with a teacher: the loss by hand, what is shown when, the same bits after a stop, the command."""
 
+import hashlib
 import json
+import math
 import os
 import signal
 import subprocess
@@ -18,7 +20,7 @@ from lib.interpreters.csg import execute_many, parse, vocabulary_of
 from lib.metrics.images import image_chamfer, iou
 from lib.models.csgnet import CSGNet, CSGNetConfig
 from lib.models.csgnet_decoding import write
-from lib.models.weights import load, read
+from lib.models.weights import load, read, save
 from lib.training import commands
 from lib.training.__main__ import COMMANDS
 from lib.training.checkpoints import KIND
@@ -316,6 +318,30 @@ def test_what_is_saved_has_the_networks_own_weights(small, tmp_path, sharing):
     found = json.loads((tmp_path / "csgnet.json").read_text())["losses"]["val_loss"]
     loss = task_of(programs(1), csg_programs(2, "val"), network, in_order=True).report(Teacher(network))
     assert loss["val_loss"] == pytest.approx(found, rel=1e-5)  # what is loaded is what was measured
+
+
+@pytest.mark.parametrize("sharing", [0, 1])
+def test_the_command_goes_on_from_weights(small, tmp_path, sharing):
+    start = tmp_path / "start.safetensors"
+    save(before := tiny(seed=5), start)
+    options = (*FEW, "--start", start, "--sharing", sharing, "--out", tmp_path / "run")
+    assert train(*options, "--rate", 1e-4) == 0
+    network = load(CSGNet, tmp_path / "run" / "csgnet.safetensors")
+    steps = 2 * math.ceil(12 / 5)
+    # A step of Adam's is about the rate at most; a shared weight is a sum of the token's own and up to four others.
+    most = steps * 1e-4 * 1.5 * (5 if sharing else 1)
+    moved = [(w - before.get_parameter(name)).abs().max() for name, w in network.named_parameters()]
+    assert 0 < max(moved) < most
+    facts = json.loads((tmp_path / "run" / "csgnet.json").read_text())
+    assert facts["settings"]["start"] == hashlib.sha256(start.read_bytes()).hexdigest()[:16]
+
+
+def test_a_start_of_the_other_dimension_is_told(small, tmp_path, capsys):
+    start = tmp_path / "start.safetensors"
+    save(tiny(), start)
+    assert train("--dimensions", 3, *FEW, "--start", start, "--out", tmp_path / "run") == 1
+    told = f"TrainingError: {start}: found a network of the plane; expected one of space\n"
+    assert capsys.readouterr().err == told and not (tmp_path / "run").exists()
 
 
 def test_the_papers_settings(small, tmp_path):

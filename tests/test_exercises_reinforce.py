@@ -2,7 +2,6 @@
 
 import math
 
-import pytest
 import torch
 
 from lib.exercises.reinforce import (
@@ -23,11 +22,6 @@ ROUGH = "t(32,24,16)s(32,40,8)+s(32,48,8)+"
 
 def others(rewards):
     return (rewards.sum(1, keepdim=True) - rewards) / (rewards.shape[1] - 1)
-
-
-@pytest.mark.parametrize("check", CHECKS)
-def test_unanswered(check):
-    assert check(None) == "not answered yet"
 
 
 def test_a_function_that_returns_nothing_is_unanswered():
@@ -85,41 +79,6 @@ def test_the_arrow():
 
 def test_one_square_is_not_enough():
     assert hints(check_arrow(refine([parse("t(32,24,16)s(32,40,12)+")], arrow()[None]).programs[0]))
-
-
-GARBAGE = [
-    -7,
-    1j,
-    "",
-    "hello",
-    b"F1",
-    "x" * 10_000,
-    object(),
-    [],
-    {},
-    {0, 1},
-    [[1]],
-    (None, 1),
-    (None, None, None),
-]
-GARBAGE += [
-    math.inf,
-    math.nan,
-    [math.nan] * 3,
-    [math.inf] * 3,
-    [10**400] * 3,
-    10**400,
-    torch.zeros(3, 3),
-    print,
-    len,
-]
-GARBAGE += [str, lambda rewards: "a", lambda: 0, "c(99999999999999999999,1,1)", "c(32,32,8)+" * 5000]
-
-
-@pytest.mark.parametrize("check", CHECKS)
-@pytest.mark.parametrize("answer", GARBAGE, ids=range(len(GARBAGE)))
-def test_garbage_becomes_a_hint(check, answer):
-    assert hints(check(answer)) or (check is check_baseline_function and check(answer) == "not answered yet")
 
 
 def fails():

@@ -3,14 +3,15 @@
     F = W_C (1 - O) + (1 - W_C) O      S = min_k (W_I F + 1 - W_I)      T = max_c W_U S        (paper, "Structure")
 
 `binary` is the language itself: shapes are in or out, connections 0 or 1. `soft` is what a network learns with: all
-values from 0 to 1. With a temperature its min and max are averages that lean to the smallest and the largest value,
-weights softmax(-temperature value) and softmax(temperature value), held constant in the gradient, as in the paper's
-program (there 20); without, they are exact.
+values from 0 to 1. Its min and max are exact; or, with a temperature, averages that lean to the smallest and the
+largest value, weights softmax(-temperature value) and softmax(temperature value), held constant in the gradient, as in
+the paper's program (there 20); or, with a power, averages that lean so by powers, which is much faster: see `powers`.
 """
 
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from .powers import power_product
 from .products import max_product
 
 
@@ -33,13 +34,14 @@ def soft(
     w_i: Float[Tensor, "*#n k c"],
     w_u: Float[Tensor, "*#n c"],
     temperature: float | None = None,
+    power: float | None = None,
 ) -> tuple[Float[Tensor, "*n c m"], Float[Tensor, "*n m"]]:
     """S and T of values from 0 to 1; differentiable in all four. An intersection of nothing is 1, a union of nothing 0.
 
-    Raises ValueError for a temperature out of range.
+    Raises ValueError for a temperature or a power out of range, and for both.
     """
-    nodes = intersection(complement(occupancy, w_c), w_i, temperature)
-    return nodes, union(nodes, w_u, temperature)
+    nodes = intersection(complement(occupancy, w_c), w_i, temperature, power)
+    return nodes, union(nodes, w_u, temperature, power)
 
 
 def complement(occupancy: Float[Tensor, "*n k m"], w_c: Float[Tensor, "*#n k"]) -> Float[Tensor, "*n k m"]:
@@ -49,14 +51,29 @@ def complement(occupancy: Float[Tensor, "*n k m"], w_c: Float[Tensor, "*#n k"]) 
 
 
 def intersection(
-    selected_from: Float[Tensor, "*n k m"], w_i: Float[Tensor, "*#n k c"], temperature: float | None = None
+    selected_from: Float[Tensor, "*n k m"],
+    w_i: Float[Tensor, "*#n k c"],
+    temperature: float | None = None,
+    power: float | None = None,
 ) -> Float[Tensor, "*n c m"]:
     """S = min_k (W F + 1 - W) = 1 - max_k W (1 - F)."""
-    return 1 - max_product(w_i, 1 - selected_from, temperature)
+    return 1 - _largest(w_i, 1 - selected_from, temperature, power)
 
 
 def union(
-    nodes: Float[Tensor, "*n c m"], w_u: Float[Tensor, "*#n c"], temperature: float | None = None
+    nodes: Float[Tensor, "*n c m"],
+    w_u: Float[Tensor, "*#n c"],
+    temperature: float | None = None,
+    power: float | None = None,
 ) -> Float[Tensor, "*n m"]:
     """T = max_c W_U S."""
-    return max_product(w_u.unsqueeze(-1), nodes, temperature).squeeze(-2)
+    return _largest(w_u.unsqueeze(-1), nodes, temperature, power).squeeze(-2)
+
+
+def _largest(w: Tensor, g: Tensor, temperature: float | None, power: float | None) -> Tensor:
+    """max_k w_kc g_km, exact or one of the two averages."""
+    if power is None:
+        return max_product(w, g, temperature)
+    if temperature is not None:
+        raise ValueError(f"found a temperature of {temperature} and a power of {power}; expected one of them")
+    return power_product(w, g, power)

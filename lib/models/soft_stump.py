@@ -1,0 +1,66 @@
+"""What CSG-Stump Net says of a batch of clouds: stumps whose connections are not decided yet.
+
+W = sigmoid(steepness * logit)      while it learns; larger steepness: nearer to 0 and 1
+W = [logit > 0]                     decided: a Stump of the language
+O = sigmoid(-sharpness * distance)
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from ..interpreters.stump import Primitive, Stump, layers
+
+SHARPNESS = 150.0  # of occupancy, per unit of length: the paper's eta, as in the authors' program
+POWER = 8.0  # of the soft layers' means, see interpreters.stump.powers
+
+
+@dataclass(frozen=True)
+class SoftStump:
+    """primitives: one batch (b, K/4) of each kind; the logits of the three matrices."""
+
+    primitives: tuple[Primitive, ...]
+    complement: Float[Tensor, "b k"]
+    intersection: Float[Tensor, "b k c"]
+    union: Float[Tensor, "b c"]
+
+    def __len__(self) -> int:
+        return len(self.union)
+
+    def distances(self, points: Float[Tensor, "b m 3"]) -> Float[Tensor, "b k m"]:
+        """Signed distance of each point to each primitive, negative inside."""
+        return torch.cat([batch.distance(points.unsqueeze(1)) for batch in self.primitives], 1)
+
+    def occupancy(
+        self,
+        distances: Float[Tensor, "b k m"],
+        steepness: float = 1.0,
+        power: float | None = POWER,
+        temperature: float | None = None,
+    ) -> Float[Tensor, "b m"]:
+        """From 0 outside to 1 inside, of points with these distances; differentiable. See `layers.soft`."""
+        matrices = [torch.sigmoid(steepness * logits) for logits in self.logits]
+        return layers.soft(torch.sigmoid(-SHARPNESS * distances), *matrices, temperature, power)[1]
+
+    def inside(self, distances: Float[Tensor, "b k m"]) -> Bool[Tensor, "b m"]:
+        """The same with all decided."""
+        return layers.binary(distances <= 0, *(logits > 0 for logits in self.logits))[1]
+
+    @property
+    def logits(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Complement (b, K), intersection (b, K, C), union (b, C)."""
+        return self.complement, self.intersection, self.union
+
+    def stumps(self) -> Sequence[Stump]:
+        """The decided stump of each cloud, on the CPU, without what it does not use."""
+        matrices = [(logits > 0).cpu() for logits in self.logits]
+        batches = [batch.to("cpu") for batch in self.primitives]
+        found = []
+        for i in range(len(self)):
+            primitives = [batch[i][k] for batch in batches for k in range(batch.translation.shape[1])]
+            primitives = [type(p).with_numbers(p, p.numbers.detach()) for p in primitives]
+            found.append(Stump(primitives, *(matrix[i] for matrix in matrices)).pruned())
+        return found

@@ -1,0 +1,173 @@
+"""CSG-Stump Net: a cloud of points in, a stump out, learned without any program (Ren et al. 2021, "CSG-Stump Net").
+
+    encoder      DGCNN: points -> feature
+    decoder      linear layers: feature -> code
+    primitives   code -> sizes, translation and rotation of K primitives, a quarter of each kind
+    connections  code -> logits of W_C (K), W_I (K, C) and W_U (C)
+
+A linear layer from the code to all K C logits of W_I is the paper's (head "linear"): at K = C = 256 it alone has 134
+million weights. The default ("low_rank") gives each primitive and each node a learned embedding, p_k and n_c, and lets
+the code weigh the products of their numbers:
+
+    logit_kc = sum_d p_kd g_d(code) n_cd
+
+Outputs are scaled to shapes of diagonal 1 around the origin, and a new network begins with something sensible: small
+primitives all over the place, and node c that selects primitive c and no other.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from ..interpreters.stump import Box, Cone, Cylinder, Primitive, Sphere
+from .dgcnn import DGCNN
+from .soft_stump import SoftStump
+
+KINDS = (Box, Cylinder, Sphere, Cone)  # in this order, a quarter of the primitives each
+HEADS = ("low_rank", "linear")
+CODE_SLOPE = 0.01  # of the decoder's leaky ReLU
+REACH = 0.5  # translations and sizes lie within
+STEEPEST = 2.0  # slope of a cone
+ON, OFF = 3.0, -3.0  # logits of W_I at first: 0.95 and 0.05
+
+
+@dataclass(frozen=True)
+class StumpNetConfig:
+    """Sizes of the network; the defaults are the paper's, but for the head.
+
+    primitives, nodes   K, a multiple of 4, and C
+    head        "low_rank" or "linear", see above; rank: numbers of an embedding
+    feature, widths     of the encoder's output, and of the decoder's layers, the code last
+    neighbours, norm    of the encoder, see DGCNN
+    complement  False: no primitive is complemented, as in the authors' program
+    Raises ValueError for other heads, sizes below 1, and K that is no multiple of 4.
+    """
+
+    primitives: int = 256
+    nodes: int = 256
+    head: str = "low_rank"
+    rank: int = 256
+    feature: int = 256
+    widths: tuple[int, ...] = (512, 1024, 2048)
+    neighbours: int = 20
+    norm: str = "batch"
+    complement: bool = True
+
+    def __post_init__(self) -> None:
+        if self.head not in HEADS:
+            raise ValueError(f"found the head {self.head!r}; expected one of {', '.join(HEADS)}")
+        if min(self.primitives, self.nodes, self.rank, self.feature, *self.widths) < 1 or self.primitives % 4:
+            raise ValueError(f"found {self}; expected sizes of at least 1, and primitives a multiple of 4")
+
+    @staticmethod
+    def compact(primitives: int = 64, nodes: int = 64) -> "StumpNetConfig":
+        """A network that two cores can train."""
+        return StumpNetConfig(primitives, nodes, rank=128, widths=(256, 512), neighbours=12, norm="layer")
+
+
+class StumpNet(nn.Module):
+    """Points (b, n, 3) of shapes of diagonal 1 around the origin to a `SoftStump` of each."""
+
+    def __init__(self, config: StumpNetConfig):
+        super().__init__()
+        self.config = config
+        self.encoder = DGCNN(config.feature, config.neighbours, config.norm)
+        self.decoder = _decoder(config.feature, *config.widths)
+        code = config.widths[-1]
+        self.primitives = nn.ModuleList(PrimitiveHead(kind, code, config.primitives // 4) for kind in KINDS)
+        self.to_complement = _quiet(code, config.primitives, OFF) if config.complement else None
+        self.to_intersection = _connections(config)
+        self.to_union = _quiet(code, config.nodes, 0.0)
+        first = torch.full((config.primitives, config.nodes), OFF)
+        first[torch.arange(config.nodes) % config.primitives, torch.arange(config.nodes)] = ON
+        self.register_buffer("first", first, persistent=False)
+
+    def forward(self, points: Float[Tensor, "b n 3"]) -> SoftStump:
+        """What the network says of each cloud."""
+        code = self.decoder(self.encoder(points))
+        primitives = tuple(head(code) for head in self.primitives)
+        if self.to_complement is None:
+            complement = code.new_full((len(code), self.config.primitives), -torch.inf)
+        else:
+            complement = self.to_complement(code)
+        return SoftStump(primitives, complement, self.first + self.to_intersection(code), self.to_union(code))
+
+
+class PrimitiveHead(nn.Module):
+    """A code (b, code) to (b, count) primitives of one kind."""
+
+    def __init__(self, kind: type[Primitive], code: int, count: int):
+        super().__init__()
+        self.kind, self.count = kind, count
+        self.widths = {
+            "rotation": 4,
+            "translation": 3,
+            **{n: w for n, w in kind.counts.items() if n != "height"},
+        }
+        self.numbers = _quiet(code, count * sum(self.widths.values()))
+        with torch.no_grad():
+            bias = self.numbers.bias.view(count, -1)
+            bias[:, :4] = _turns(count) if kind in (Cylinder, Cone) else torch.tensor([1.0, 0, 0, 0])
+            bias[:, 4:7].uniform_(-1, 1)
+
+    def forward(self, code: Float[Tensor, "b code"]) -> Primitive:
+        numbers = self.numbers(code).view(len(code), self.count, -1).split(list(self.widths.values()), -1)
+        given = dict(zip(self.widths, numbers))
+        return self.kind(**{name: self._scaled(name, value) for name, value in given.items()})
+
+    def _scaled(self, name: str, value: Float[Tensor, "b count k"]) -> Tensor:
+        if name == "rotation":
+            return value
+        if name == "translation":
+            return REACH * value.tanh()
+        most = STEEPEST if name == "slope" else REACH
+        value = most * torch.sigmoid(value - 1.5)  # 0.18 of the most at first
+        return value if self.kind.counts[name] > 1 else value.squeeze(-1)
+
+
+class LowRank(nn.Module):
+    """A code (b, code) to logits (b, K, C): a weighted sum of `rank` products of embeddings."""
+
+    def __init__(self, code: int, primitives: int, nodes: int, rank: int):
+        super().__init__()
+        scale = rank**-0.25  # of both: logits begin as large as the code's weights, whatever the rank
+        self.of_primitives = nn.Parameter(scale * torch.randn(primitives, rank))
+        self.of_nodes = nn.Parameter(scale * torch.randn(nodes, rank))
+        self.weights = _quiet(code, rank)
+
+    def forward(self, code: Float[Tensor, "b code"]) -> Float[Tensor, "b K C"]:
+        return (self.of_primitives * self.weights(code).unsqueeze(1)) @ self.of_nodes.T
+
+
+def _connections(config: StumpNetConfig) -> nn.Module:
+    code, shape = config.widths[-1], (config.primitives, config.nodes)
+    if config.head == "low_rank":
+        return LowRank(code, *shape, config.rank)
+    return nn.Sequential(_quiet(code, config.primitives * config.nodes), nn.Unflatten(1, shape))
+
+
+def _decoder(*widths: int) -> nn.Sequential:
+    layers = []
+    for wide, next_wide in zip(widths, widths[1:]):
+        layers += [nn.Linear(wide, next_wide), nn.LeakyReLU(CODE_SLOPE)]
+        nn.init.xavier_normal_(layers[-2].weight)
+        nn.init.zeros_(layers[-2].bias)
+    return nn.Sequential(*layers)
+
+
+def _quiet(wide: int, outputs: int, bias: float = 0.0) -> nn.Linear:
+    """A linear layer whose outputs are near its bias at first."""
+    layer = nn.Linear(wide, outputs)
+    nn.init.normal_(layer.weight, std=0.1 / wide**0.5)
+    nn.init.constant_(layer.bias, bias)
+    return layer
+
+
+def _turns(count: int) -> Float[Tensor, "count 4"]:
+    """Rotations that lay the z axis along z, y, x, -z, … in turn."""
+    half = 0.5**0.5
+    turns = torch.tensor([[1, 0, 0, 0], [half, half, 0, 0], [half, 0, half, 0], [0, 1, 0, 0], [half, -half, 0, 0],
+                          [half, 0, -half, 0]])  # fmt: skip
+    return turns[torch.arange(count) % len(turns)]

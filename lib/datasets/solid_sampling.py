@@ -1,0 +1,96 @@
+"""A solid as CSG-Stump Net learns from it: points on its surface with normals, and points of space, in or out.
+
+The solid is moved and scaled so that its bounding box has diagonal 1 and its middle at the origin. Half of the points
+of space are inside, half outside. They are chosen from candidates of which half are spread over the bounding box and a
+tenth around it, and half lie near the surface, within about 2 % of the diagonal: of thin parts the box alone would say
+next to nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from jaxtyping import Bool, Float
+
+from .base import DataError
+
+AROUND = 1.1  # the candidates' box, as a multiple of the bounding box
+NEAR = 0.02  # standard deviation of the distance from the surface, in diagonals
+SKIN = 1e-4  # diagonals: a face with the solid so close in front of it lies inside of another part
+ROUNDS = 40  # of candidates; a solid that needs more is hardly one
+
+Contains = Callable[[Float[np.ndarray, "m 3"]], Bool[np.ndarray, " m"]]
+
+
+@dataclass(frozen=True)
+class SolidSample:
+    """points, normals (p, 3): on the surface, uniform by area; queries (q, 3): the first half inside, the rest not."""
+
+    points: Float[np.ndarray, "p 3"]
+    normals: Float[np.ndarray, "p 3"]
+    queries: Float[np.ndarray, "q 3"]
+
+
+def sample_solid(
+    mesh: trimesh.Trimesh, contains: Contains, points: int = 2048, queries: int = 4096, seed: int = 0
+) -> SolidSample:
+    """Samples of the solid that `mesh` bounds, with outward faces; parts may overlap: faces inside others are left out.
+
+    contains  tells of points (m, 3), in the mesh's coordinates, whether they are in the solid
+    Raises DataError for a mesh without extent, and where no points are found inside, outside or on it.
+    """
+    if not len(mesh.faces) or not np.isfinite(mesh.bounds).all() or not np.ptp(mesh.bounds, axis=0).any():
+        raise DataError(f"found a mesh of {len(mesh.faces)} faces without extent; expected a solid")
+    rng = np.random.default_rng(seed)
+    low, high = mesh.bounds
+    middle, scale = (low + high) / 2, 1 / np.linalg.norm(high - low)
+    fitted = trimesh.Trimesh((mesh.vertices - middle) * scale, mesh.faces, process=False)
+
+    def inside(places: np.ndarray) -> np.ndarray:
+        return contains(places / scale + middle)
+
+    on_surface = {"points on the surface": points}
+    surface = _enough(lambda: _on_surface(fitted, inside, points, rng), on_surface)[0]
+    draw = _Queries(fitted.bounds * AROUND, surface[:, :3], inside, queries, rng)
+    halves = {"points inside": queries // 2, "points outside": queries - queries // 2}
+    within, beyond = _enough(draw, halves)
+    return SolidSample(surface[:, :3], surface[:, 3:], np.concatenate([within, beyond]))
+
+
+def _enough(draw: Callable[[], list[np.ndarray]], wanted: dict[str, int]) -> list[np.ndarray]:
+    """Rows of several kinds, drawn until there are enough of each; the first ones."""
+    rounds: list[list[np.ndarray]] = []
+    for _ in range(ROUNDS):
+        rounds.append(draw())
+        found = [np.concatenate(kind) for kind in zip(*rounds)]
+        if all(len(rows) >= count for rows, count in zip(found, wanted.values())):
+            return [rows[:count] for rows, count in zip(found, wanted.values())]
+    counts = ", ".join(f"{len(rows)} {name}" for rows, name in zip(found, wanted))
+    raise DataError(f"found {counts}; expected a solid, with {max(wanted.values())} of each")
+
+
+def _on_surface(mesh: trimesh.Trimesh, inside: Contains, count: int, rng) -> list[np.ndarray]:
+    """Points of the mesh and their faces' normals side by side, those left out that are inside another part."""
+    points, faces = trimesh.sample.sample_surface(mesh, 2 * count, seed=int(rng.integers(2**31)))
+    normals = mesh.face_normals[faces]
+    return [np.concatenate([points, normals], 1)[~inside(points + SKIN * normals)]]
+
+
+@dataclass(frozen=True)
+class _Queries:
+    box: np.ndarray
+    surface: np.ndarray
+    inside: Contains
+    count: int
+    rng: np.random.Generator
+
+    def __call__(self) -> list[np.ndarray]:
+        """Some candidates: those inside, those outside."""
+        spread = self.rng.uniform(*self.box, (self.count, 3))
+        near = self.surface[self.rng.integers(len(self.surface), size=self.count)]
+        near = near + self.rng.normal(0, NEAR, near.shape)
+        candidates = self.rng.permutation(np.concatenate([spread, near]))
+        candidates = candidates.astype(np.float16).astype(float)  # kept so: none may change sides when it is rounded
+        is_in = self.inside(candidates)
+        return [candidates[is_in], candidates[~is_in]]

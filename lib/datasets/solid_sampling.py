@@ -91,6 +91,8 @@ class _Queries:
         near = self.surface[self.rng.integers(len(self.surface), size=self.count)]
         near = near + self.rng.normal(0, NEAR, near.shape)
         candidates = self.rng.permutation(np.concatenate([spread, near]))
-        candidates = candidates.astype(np.float16).astype(float)  # kept so: none may change sides when it is rounded
+        candidates = candidates.astype(np.float16).astype(
+            float
+        )  # kept so: none may change sides when it is rounded
         is_in = self.inside(candidates)
         return [candidates[is_in], candidates[~is_in]]

@@ -64,7 +64,9 @@ _ADVICE = "choose another --out, or remove that folder to begin anew"
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file that a killed run never leaves half under its real name; one that is the same is left alone."""
+    """Write a file that a killed run never leaves half under its real name; one that is the same is left alone. Behind
+    a link, the file that it leads to is written."""
+    path = path.resolve()
     if path.is_file() and path.read_bytes() == content:
         return
     path.parent.mkdir(parents=True, exist_ok=True)

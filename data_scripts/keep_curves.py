@@ -28,11 +28,17 @@ def curve(named: str) -> dict:
         raise DataError(f"found {named!r}; expected NAME=FOLDER, and a {LOG} in the folder")
     try:
         log = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-        facts = [json.loads(each.read_text(encoding="utf-8")) for each in sorted(Path(folder).glob("*.json"))]
-    except ValueError as error:
-        raise DataError(f"{folder}: a file in it is damaged ({error})") from error
-    command = {"command": facts[0]["command"]} if facts else {}
-    return {"name": name, **command, "log": log}
+        if [row["epoch"] for row in log] != list(range(1, len(log) + 1)) or not log:
+            raise ValueError("its log has no rows of epochs 1, 2, …")
+        return {"name": name, **_command(Path(folder)), "log": log}
+    except (ValueError, TypeError, KeyError) as error:
+        raise DataError(f"{folder}: a file in it is damaged, or of no run ({error})") from error
+
+
+def _command(folder: Path) -> dict[str, str]:
+    """The command, from the facts beside the run's weights; nothing where it has not ended."""
+    facts = [path for path in folder.glob("*.json") if path.with_suffix(".safetensors").is_file()]
+    return {"command": json.loads(facts[0].read_text(encoding="utf-8"))["command"]} if facts else {}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -47,6 +53,8 @@ def main(arguments: list[str] | None = None) -> int:
     def work() -> None:
         check_writable(options.out)
         found = {"runs": [curve(named) for named in options.runs]}
+        if len({run["name"] for run in found["runs"]}) < len(options.runs):
+            raise DataError("found two runs of one name; expected names that differ")
         write_whole(options.out, (json.dumps(found, indent=1) + "\n").encode())
         print(f"{len(found['runs'])} curves kept in {options.out}")
 

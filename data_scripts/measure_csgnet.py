@@ -7,10 +7,10 @@
     python -m data_scripts.measure_csgnet logos                       what the paper shows of logos, in numbers
 
 Make the data first: make_csg_programs (also with --dimensions 3), make_silhouettes, make_logos. Without it the few
-programs and masks that are made on the spot are measured, and the result says so.
+programs and silhouettes that are made on the spot are measured, and the result says so; there are no such logos.
 
 Each writes results/csgnet/NAME.json, with counts, the date and the version of code and weights. With --weights and
---out, other networks are measured: those of other seeds are in results/csgnet/other_seeds. The nearest neighbours are
+--out, other networks are measured, such as those of other seeds. The nearest neighbours are
 searched in all training programs; this and Powell's method take most of the time: 10 to 40 minutes a table on one core.
 --quick takes 16 of everything and a hundredth of the training programs.
 """
@@ -41,7 +41,7 @@ from lib.finding.picture_refining import refine
 from lib.finding.primitive_detection import detection_precision
 from lib.interpreters.csg import Program, Shapes, execute_many, vocabulary_of
 from lib.interpreters.csg.packing import pack
-from lib.models.csgnet import CSGNet
+from lib.models.csgnet import CSGNet, check_reader
 from lib.models.csgnet_beams import beam_search
 from lib.models.pretrained import pretrained
 from lib.models.weights import CheckpointError, load
@@ -66,7 +66,7 @@ DECIDING = ("interpreters", "models", "metrics", "finding")  # parts of lib that
 
 def synthetic(dimensions: int, network: CSGNet, count: int, quick: bool) -> dict:
     """Tables 2 and 4: mean likeness of the answers to the shapes, all and by length of the program that drew them."""
-    test, known = evenly(csg_programs(dimensions, "test"), count), known_programs(dimensions, quick)
+    test, known = some(evenly(csg_programs(dimensions, "test"), count)), known_programs(dimensions, quick)
     shapes = execute_many(test.tokens, test.vocabulary)
     canvases = shapes.images if dimensions == 2 else shapes.grids
     methods = {"nearest": partial(neighbours, canvases, shapes.words, known)}
@@ -82,7 +82,14 @@ def synthetic(dimensions: int, network: CSGNet, count: int, quick: bool) -> dict
 
 def known_programs(dimensions: int, quick: bool) -> TokenSet:
     """What the nearest neighbours are searched in."""
-    return csg_programs(dimensions, "train")[:: 100 if quick else 1]
+    return some(csg_programs(dimensions, "train")[:: 100 if quick else 1])
+
+
+def some(found):
+    """The same. Raises DataError for no programs, or no masks."""
+    if not len(found):
+        raise DataError(f"{found.describe()} There is nothing to measure; expected 1 or more")
+    return found
 
 
 def neighbours(canvases: Tensor, words: Tensor, known: TokenSet) -> Choice:
@@ -124,14 +131,14 @@ def compared(shapes: Shapes, choice: Choice) -> dict:
 def silhouette_table(supervised: CSGNet, reinforced: CSGNet, count: int, quick: bool) -> dict:
     """Table 3: mean Chamfer distance to silhouettes after so many iterations of refinement, coordinate search on all
     and Powell's method on some."""
-    masks = silhouettes(split="test")
+    masks = some(silhouettes(split="test"))
     images, known = masks.images[spread(len(masks), count)], known_programs(2, quick)
     choices = {"nearest": neighbours(images, pack(images), known)}
     for name, network in {"supervised": supervised, "reinforced": reinforced}.items():
         choices |= {f"{name} k={k}": parsed(network, images, k) for k in (1, 10)}
-    some = spread(len(images), QUICK if quick else POWELL)
-    rows = {name: refined(choice, images, some) for name, choice in choices.items()}
-    return {"data": masks.source, "samples": len(images), "powell_samples": len(some), "rows": rows}
+    few = spread(len(images), QUICK if quick else POWELL)
+    rows = {name: refined(choice, images, few) for name, choice in choices.items()}
+    return {"data": masks.source, "samples": len(images), "powell_samples": len(few), "rows": rows}
 
 
 def refined(choice: Choice, images: Tensor, some: Tensor) -> dict:
@@ -166,7 +173,7 @@ def at_iterations(distances: Sequence[float]) -> dict[str, float]:
 
 def detection(network: CSGNet, count: int) -> dict:
     """Table 5: average precision of primitives, percent, and images a second."""
-    test = evenly(csg_programs(2, "test"), count)
+    test = some(evenly(csg_programs(2, "test"), count))
     images, rows = execute_many(test.tokens, test.vocabulary).images, {}
     for k in (10, 40):
         start = time.perf_counter()
@@ -179,7 +186,7 @@ def detection(network: CSGNet, count: int) -> dict:
 
 def logo_table(supervised: CSGNet, reinforced: CSGNet, count: int) -> dict:
     """Mean Chamfer distance to logos, which no network has seen, before and after refinement."""
-    masks = logos()
+    masks = some(logos())
     images, rows = masks.images[spread(len(masks), count)], {}
     for name, network in {"supervised": supervised, "reinforced": reinforced}.items():
         found = refine(programs_of(parsed(network, images, 10)), images).distances
@@ -210,8 +217,10 @@ def measure(options: argparse.Namespace) -> dict:
 def network_of(path: Path, dimensions: int) -> CSGNet:
     """A trained network. Raises CheckpointError, and DataError for one of other dimensions."""
     network = load(CSGNet, path)
-    if (found := network.config.dimensions) != dimensions:
-        raise DataError(f"{path}: found a network of {found} dimensions; expected one of {dimensions}")
+    try:
+        check_reader(network, dimensions)
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from error
     return network
 
 

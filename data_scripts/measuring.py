@@ -54,6 +54,8 @@ def check_writable(path: Path) -> None:
     """Makes the folder that the file will be in. Raises DataError or OSError for a file that cannot be written."""
     if path.is_dir():
         raise DataError(f"{path} is a folder; expected the name of a file to write")
+    if path.exists() and not path.is_file():
+        raise DataError(f"{path} is a device, or the like; expected the name of a file to write")
     path.parent.mkdir(parents=True, exist_ok=True)
     if not os.access(path.parent, os.W_OK) or path.exists() and not os.access(path, os.W_OK):
         raise DataError(f"{path} cannot be written; expected a file in a folder of yours")

@@ -211,12 +211,12 @@ def test_canvases_of_another_shape_or_type_are_refused(network, canvases, change
     with pytest.raises(ValueError) as error:
         network.begin(wrong)
     assert f"{str(wrong.dtype)[6:]} {tuple(wrong.shape)}" in str(error.value)
-    assert ", ".join(["expected bool (n", *["64"] * network.config.dimensions]) in str(error.value)
+    assert ", ".join(["expected a bool tensor (n", *["64"] * network.config.dimensions]) in str(error.value)
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_a_network_of_the_plane_refuses_grids_and_the_other_way_round(dimensions):
-    with pytest.raises(ValueError, match="expected bool"):
+    with pytest.raises(ValueError, match="expected a bool tensor"):
         CSGNet(SMALL[dimensions]).begin(canvases_of(5 - dimensions))
 
 
@@ -243,3 +243,18 @@ def test_a_network_of_the_plane_refuses_grids_and_the_other_way_round(dimensions
 def test_sizes_that_make_no_network_are_refused(wrong, message):
     with pytest.raises(ValueError, match=message):
         CSGNetConfig(**wrong)
+
+
+@pytest.mark.parametrize("dimensions", [0, 1, 4, "2"])
+@pytest.mark.usefixtures("unchecked_shapes")
+def test_sizes_of_other_dimensions_are_refused(dimensions):
+    for sizes in (CSGNetConfig.paper, CSGNetConfig.compact):
+        with pytest.raises(ValueError, match=f"found {dimensions!r} dimensions; expected 2 or 3"):
+            sizes(dimensions)
+
+
+@pytest.mark.usefixtures("unchecked_shapes")
+def test_canvases_that_are_no_tensor_are_refused(network, canvases):
+    for wrong, kind in ((canvases.numpy(), "ndarray"), (canvases.tolist(), "list"), (None, "NoneType")):
+        with pytest.raises(ValueError, match=f"found canvases as a {kind}; expected a bool tensor"):
+            network.begin(wrong)

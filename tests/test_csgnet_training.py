@@ -340,7 +340,7 @@ def test_a_start_of_the_other_dimension_is_told(small, tmp_path, capsys):
     start = tmp_path / "start.safetensors"
     save(tiny(), start)
     assert train("--dimensions", 3, *FEW, "--start", start, "--out", tmp_path / "run") == 1
-    told = f"TrainingError: {start}: found a network of the plane; expected one of space\n"
+    told = f"TrainingError: {start}: found a network of the plane with 400 tokens; expected one of space with 6635\n"
     assert capsys.readouterr().err == told and not (tmp_path / "run").exists()
 
 
@@ -492,3 +492,31 @@ def test_two_processes_learn_what_one_does(tmp_path, monkeypatch):
             [row[name] for name in ("loss", "val_loss")], rel=1e-4
         )
     assert json.loads((tmp_path / "two" / "csgnet.json").read_text())["machine"]["processes"] == 2
+
+
+@pytest.mark.parametrize("empty", ["train", "val"])
+def test_no_programs_are_told_before_the_first_epoch(small, tmp_path, capsys, monkeypatch, empty):
+    def some(dimensions, split):
+        return csg_programs(dimensions, split)[: 0 if split == empty else None]
+
+    monkeypatch.setattr("lib.training.csgnet_command.csg_programs", some)
+    assert train(*FEW, "--out", tmp_path / "run") == 1
+    error = capsys.readouterr().err
+    assert error.startswith("DataError: there are ") and "expected some of both" in error
+
+
+def test_a_full_disk_leaves_no_half_facts(small, tmp_path, capsys, monkeypatch):
+    write = Path.write_text
+
+    def full(path, text, **options):
+        if path.name.startswith("csgnet.json"):
+            write(path, text[:10], **options)
+            raise OSError("No space left on device")
+        return write(path, text, **options)
+
+    monkeypatch.setattr(Path, "write_text", full)
+    assert train(*FEW, "--out", tmp_path / "run") == 1
+    assert "No space left" in capsys.readouterr().err
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == [
+        CHECKPOINT, "csgnet.safetensors", LOG,
+    ]  # fmt: skip

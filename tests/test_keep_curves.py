@@ -15,6 +15,8 @@ def run(tmp_path):
     rows = [{"epoch": 1, "reward": 0.25}, {"epoch": 2, "reward": 0.5}]
     (folder / "log.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     (folder / "csgnet_reinforce.json").write_text(json.dumps({"command": "python -m lib.training x"}))
+    (folder / "csgnet_reinforce.safetensors").write_bytes(b"")
+    (folder / "a_notes.json").write_text("[]")  # not the run's
     return folder
 
 
@@ -41,7 +43,22 @@ def test_what_is_no_run(named, tmp_path, capsys):
     assert "expected NAME=FOLDER" in capsys.readouterr().err and not out.exists()
 
 
-def test_a_damaged_log(run, tmp_path, capsys):
-    (run / "log.jsonl").write_text("{half")
+@pytest.mark.parametrize(
+    "log", ["{half", "", "5\n", "[1]\n", '{"reward": 1}\n', '{"epoch": 2}\n{"epoch": 1}\n']
+)
+def test_a_damaged_log(run, tmp_path, capsys, log):
+    (run / "log.jsonl").write_text(log)
     assert main([f"a={run}", "--out", str(tmp_path / "curves.json")]) == 1
     assert "damaged" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("facts", ["{half", "{}", "[]", "null"])
+def test_damaged_facts(run, tmp_path, capsys, facts):
+    (run / "csgnet_reinforce.json").write_text(facts)
+    assert main([f"a={run}", "--out", str(tmp_path / "curves.json")]) == 1
+    assert "damaged" in capsys.readouterr().err
+
+
+def test_two_runs_of_one_name(run, tmp_path, capsys):
+    assert main([f"a={run}", f"a={run}", "--out", str(tmp_path / "curves.json")]) == 1
+    assert "two runs of one name" in capsys.readouterr().err

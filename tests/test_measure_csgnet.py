@@ -1,6 +1,7 @@
 """Tables 2 to 5: with networks that always answer the same, every number in a row is known beforehand."""
 
 import json
+import os
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -311,7 +312,10 @@ def refused(capsys, out: Path, *options: object) -> str:
         (["silhouettes", "--dimensions", "3"], "silhouettes is of the plane; expected --dimensions 2"),
         (["detection", "--dimensions", "3"], "detection is of the plane"),
         (["logos", "--dimensions", "3"], "logos is of the plane"),
-        (["synthetic", "--dimensions", "3"], "found a network of 2 dimensions; expected one of 3"),
+        (
+            ["synthetic", "--dimensions", "3"],
+            "found a network of the plane with 400 tokens; expected one of space with 6635",
+        ),
         (["logos", "--reinforced", "same"], "python -m data_scripts.make_logos"),
     ],
 )
@@ -329,7 +333,7 @@ def test_weights_of_something_else_are_told(tmp_path, capsys):
     )
     save(network(SPACE), tmp_path / "space")
     error = refused(capsys, tmp_path / "o.json", "detection", "--weights", tmp_path / "space")
-    assert "found a network of 3 dimensions; expected one of 2" in error
+    assert "found a network of space with 6635 tokens; expected one of the plane with 400" in error
 
 
 def test_weights_that_do_not_come_with_the_project_are_told(monkeypatch, tmp_path, capsys):
@@ -370,3 +374,34 @@ def test_every_split_is_the_one_it_should_be(monkeypatch, weights, tmp_path):
     monkeypatch.setattr(measure_csgnet, "csg_programs", recorded)
     run(tmp_path / "one.json", "synthetic", "--quick", "--weights", weights)
     assert sorted(asked) == ["test", "train"]
+
+
+@pytest.mark.parametrize("table", ["synthetic", "detection"])
+def test_a_network_with_another_vocabulary_is_told(tmp_path, capsys, table):
+    save(network(CSGNetConfig(2, 10, (2,), (16,), (16,), (1,), "none", 4, 8, 0.0)), tmp_path / "ten")
+    error = refused(capsys, tmp_path / "o.json", table, "--weights", tmp_path / "ten")
+    assert "found a network of the plane with 10 tokens; expected one of the plane with 400" in error
+
+
+@pytest.mark.parametrize("table", ["synthetic", "silhouettes", "detection"])
+def test_nothing_to_measure_is_told(weights, tmp_path, capsys, monkeypatch, table):
+    none = csg_programs(2, "test")[:0]
+    monkeypatch.setattr(measure_csgnet, "csg_programs", lambda *_: none)
+    monkeypatch.setattr(measure_csgnet, "silhouettes", lambda **_: silhouettes("embedded")[:0])
+    options = ["--weights", weights, *(["--reinforced", weights] if table == "silhouettes" else [])]
+    error = refused(capsys, tmp_path / "o.json", table, *options)
+    assert "There is nothing to measure; expected 1 or more" in error
+
+
+def test_a_device_is_not_replaced(weights, tmp_path, capsys):
+    device = tmp_path / "pipe"
+    os.mkfifo(device)
+    error = refused(capsys, device, "synthetic", "--weights", weights)
+    assert "is a device, or the like; expected the name of a file" in error and device.is_fifo()
+
+
+def test_behind_a_link_the_file_is_written(weights, tmp_path):
+    link, file = tmp_path / "link.json", tmp_path / "file.json"
+    link.symlink_to(file)
+    assert measure_csgnet.main(["detection", "--quick", "--weights", str(weights), "--out", str(link)]) == 0
+    assert link.is_symlink() and json.loads(file.read_text())["table"] == "detection"

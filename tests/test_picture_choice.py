@@ -79,6 +79,8 @@ def test_what_cannot_be_executed_overlaps_nothing(unchecked_shapes):
     tokens = torch.tensor([[[SPACE.stop], [SPACE.index("+")], [0]]])
     choice = best_of(execute_many(tokens[0, 2:], SPACE).grids, tokens)
     assert choice.measure.tolist() == [[0, 0, 1]]
+    blank = best_of(torch.zeros(1, 64, 64, 64, dtype=torch.bool), tokens)
+    assert blank.measure.tolist() == [[0, 0, 0]]  # neither does it draw what is blank
 
 
 def test_parts_make_the_same_as_all_at_once(several, monkeypatch, unchecked_shapes):

@@ -23,7 +23,7 @@ from lib.models.weights import load, read, save
 from lib.training import commands, reinforce, reinforce_command
 from lib.training.__main__ import COMMANDS
 from lib.training.checkpoints import KIND
-from lib.training.loop import CHECKPOINT, LOG, Schedule, fit
+from lib.training.loop import CHECKPOINT, LOG, Schedule, TrainingError, fit
 from lib.training.reinforce import BASELINES, Actor, ReinforceTask, rewards_of
 from tests.conftest import unchecked
 from tests.csgnets import all_programs, allowed_next, random_network
@@ -433,7 +433,7 @@ def test_a_start_that_is_no_network_of_the_plane_is_told(small, tmp_path, capsys
         "text": "CheckpointError: {}: is damaged, or no safetensors file",
         "folder": "CheckpointError: {}: cannot be read (it is a folder; expected a file)",
         "checkpoint": "CheckpointError: {}: found weights of kind 'training run'; expected 'CSGNet'",
-        "space": "TrainingError: {}: found a network of space; expected one of the plane",
+        "space": "TrainingError: {}: found a network of space with 6635 tokens; expected one of the plane with 400",
     }[kind].format(path)
     assert error.startswith(told) and error.count("\n") == 1 and not out.exists()
 
@@ -595,3 +595,10 @@ def test_pictures_of_random_programs(small, tmp_path, capsys):
     options = ["--epochs", 1, "--batch", 600, "--samples", 1, "--source", "synthetic"]
     assert train(*options, "--out", tmp_path / "run") == 0
     assert "Pictures of 1200 random 2D train programs" in capsys.readouterr().out
+
+
+def test_numbers_that_are_not_finite_are_told(tmp_path):
+    network = tiny()
+    torch.nn.init.constant_(network.scores.bias, float("nan"))
+    with pytest.raises(TrainingError, match="epoch 1, batch 1: loss nan.*try a lower rate"):
+        fit(task_of(network, drawn("c(32,32,16)")), Schedule(epochs=1, batch=1, rate=0.1), tmp_path)

@@ -190,9 +190,7 @@ def test_another_network_is_refused():
     with pytest.raises(TypeError, match="found a NoneType; expected a CSGNet"):
         draw_a_shape(None)
     config = CSGNetConfig(3, 6635, (2,), (4,), (4,), (4,), "none", 2, 2, 0.0)
-    with pytest.raises(
-        ValueError, match="3 dimensions and 6635 tokens; expected one of the plane, 2 and 400"
-    ):
+    with pytest.raises(ValueError, match="of space with 6635 tokens; expected one of the plane with 400"):
         draw_a_shape(CSGNet(config))
 
 

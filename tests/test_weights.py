@@ -167,3 +167,12 @@ def test_missing_and_surplus_arrays_are_named(path, network):
     write(path, tensors, "Tiny", {"config": {"widths": [4, 2], "name": ""}})
     with pytest.raises(CheckpointError, match="found nothing as 'norm.weight'"):
         load(Tiny, path)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_weights_that_are_not_finite_are_refused(network, path, value):
+    with torch.no_grad():
+        network.layer.bias[1] = value
+    save(network, path)
+    with pytest.raises(CheckpointError, match="not finite in 'layer.bias'; expected finite ones"):
+        load(Tiny, path)

@@ -62,7 +62,7 @@ class TokenSet(Sequence):
         if self.source == "made":
             return f"{len(self)} random {self.name} programs, made by data_scripts.make_csg_programs."
         return (
-            f"{len(self)} random {self.name} programs, made on the spot (as many as the paper has: "
+            f"{len(self)} random {self.name} programs, made on the spot (for as many as the paper has: "
             f"python -m data_scripts.make_csg_programs --dimensions {self.vocabulary.dimensions})."
         )
 

@@ -17,7 +17,7 @@ CANVASES_AT_ONCE = {2: 4096, 3: 64}  # little enough for memory
 class Choice:
     """For each target the best of its programs: tokens, its number among them, and the measure of all of them.
 
-    measure  Chamfer distance, px, of pictures (16 for what cannot be executed); IoU of grids
+    measure  Chamfer distance, px, of pictures (16 for what cannot be executed); IoU of grids (0 for that)
     """
 
     tokens: Int[Tensor, "n length"]
@@ -55,5 +55,5 @@ def _measured(targets: Tensor, tokens: Tensor, dimensions: int) -> Float[Tensor,
     shapes = execute_many(tokens.flatten(0, 1), vocabulary_of(dimensions))
     repeated = targets.repeat_interleave(tokens.shape[1], 0)
     if dimensions == 3:
-        return iou(repeated, shapes.grids, dims=3).view(tokens.shape[:2])
+        return iou(repeated, shapes.grids, dims=3).masked_fill(~shapes.valid, 0).view(tokens.shape[:2])
     return image_chamfer(repeated, shapes.images).view(tokens.shape[:2])  # what is not valid is blank

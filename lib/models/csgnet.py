@@ -15,6 +15,8 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
+from ..interpreters.csg import vocabulary_of
+
 SIDE = 64  # pixels or voxels along each side of a canvas
 NORMS = ("none", "batch", "group")
 
@@ -76,20 +78,32 @@ class CSGNetConfig:
 
     @classmethod
     def paper(cls, dimensions: int = 2) -> "CSGNetConfig":
-        """The paper's sizes: Tables 6 and 7 for the plane, 8 and 9 for space."""
-        if dimensions == 2:
+        """The paper's sizes: Tables 6 and 7 for the plane, 8 and 9 for space.
+
+        Raises ValueError for other dimensions than 2 and 3.
+        """
+        if _checked(dimensions) == 2:
             return cls()
         channels, ones, twos = (32, 64, 128, 256, 256), (1,) * 5, (2,) * 5
         return cls(3, 6635, channels, (4, 4, 3, 3, 3), ones, twos, "batch", hidden=1500)
 
     @classmethod
     def compact(cls, dimensions: int = 2) -> "CSGNetConfig":
-        """Sizes that train on two cores: convolutions that stride instead of pooling, and a smaller GRU."""
-        if dimensions == 2:
+        """Sizes that train on two cores: convolutions that stride instead of pooling, and a smaller GRU.
+
+        Raises ValueError for other dimensions than 2 and 3.
+        """
+        if _checked(dimensions) == 2:
             channels, kernels, strides = (16, 32, 64, 64, 16), (4, 4, 4, 3, 1), (2, 2, 2, 1, 1)
             return cls(2, 400, channels, kernels, strides, (1,) * 5, "batch", 64, 496, 0.0)
         channels, kernels, strides = (32, 48, 64, 96, 16), (4, 4, 3, 2, 1), (4, 2, 1, 2, 1)
         return cls(3, 6635, channels, kernels, strides, (1,) * 5, "batch", 32, 224, 0.0)
+
+
+def _checked(dimensions: int) -> int:
+    if dimensions not in (2, 3):
+        raise ValueError(f"found {dimensions!r} dimensions; expected 2 or 3")
+    return dimensions
 
 
 @dataclass(frozen=True)
@@ -133,9 +147,14 @@ class CSGNet(nn.Module):
         Raises ValueError for canvases of another shape or type.
         """
         expected = (SIDE,) * self.config.dimensions
-        if canvases.dtype != torch.bool or canvases.shape[1:] != expected:
-            found = f"{str(canvases.dtype)[6:]} {tuple(canvases.shape)}"
-            raise ValueError(f"found canvases {found}; expected bool (n, {', '.join(map(str, expected))})")
+        if not isinstance(canvases, Tensor) or canvases.dtype != torch.bool or canvases.shape[1:] != expected:
+            kind = type(canvases).__name__
+            found = (
+                f"{str(canvases.dtype)[6:]} {tuple(canvases.shape)}" if kind == "Tensor" else f"as a {kind}"
+            )
+            raise ValueError(
+                f"found canvases {found}; expected a bool tensor (n, {', '.join(map(str, expected))})"
+            )
         weight = self.gru.weight_ih[:, : self.config.feature]
         pixels = canvases.unsqueeze(1).to(weight.dtype)
         feature = nn.functional.linear(self.encoder(pixels).flatten(1), weight, self.gru.bias_ih)
@@ -192,3 +211,14 @@ def _encoder(config: CSGNetConfig) -> nn.Sequential:
         layers += [norms[config.norm](channels)]
         inner = channels
     return nn.Sequential(*layers)
+
+
+def check_reader(network: CSGNet, dimensions: int) -> None:
+    """Raises ValueError for a network of other dimensions, or with another vocabulary than that of the language."""
+    found, tokens = network.config, len(vocabulary_of(dimensions))
+    if (found.dimensions, found.tokens) != (dimensions, tokens):
+        spaces = {2: "the plane", 3: "space"}
+        raise ValueError(
+            f"found a network of {spaces[found.dimensions]} with {found.tokens} tokens; "
+            f"expected one of {spaces[dimensions]} with {tokens}"
+        )

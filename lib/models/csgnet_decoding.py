@@ -75,4 +75,5 @@ def _drawn(odds: Float[Tensor, "rows tokens"], noise: torch.Generator) -> Int[Te
     """A token a row: the first at which the sum of all probabilities up to it reaches a random height, above 0."""
     sums = odds.detach().exp().cumsum(1)
     height = (1 - torch.rand(len(odds), generator=noise)).to(odds)
-    return torch.searchsorted(sums, (height * sums[:, -1]).unsqueeze(1)).squeeze(1)
+    first = torch.searchsorted(sums, (height * sums[:, -1]).unsqueeze(1)).squeeze(1)
+    return first.clamp(max=odds.shape[1] - 1)  # past the end where probabilities are NaN: the loss will tell

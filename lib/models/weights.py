@@ -37,9 +37,14 @@ def save(network: nn.Module, path: Path) -> None:
 def load(network: type[Network], path: Path, device: torch.device | str = "cpu") -> Network:
     """The network of a file, in evaluation mode. Random numbers drawn later are the same as without loading.
 
-    Raises CheckpointError for a file that is missing, damaged, foreign, or of another network or other shapes.
+    Raises CheckpointError for a file that is missing, damaged, foreign, or of another network or other shapes, and for
+    weights that are not finite.
     """
     tensors, facts = read(path, network.__name__)
+    if wrong := [name for name, tensor in tensors.items() if not tensor.isfinite().all()]:
+        raise CheckpointError(
+            f"{path}: found numbers that are not finite in {wrong[0]!r}; expected finite ones"
+        )
     config = _config(network, facts.get("config"), path)
     with torch.device("meta"):  # shapes without memory: a wrong config cannot ask for more than there is
         _check(path, tensors, _build(network, config, path).state_dict())

@@ -26,10 +26,11 @@ from torch import nn
 from ..datasets import REPOSITORY, DataError
 from ..interpreters.shapeassembly import ProgramError
 from ..models.weights import CheckpointError, save
-from .loop import CHECKPOINT, Schedule, Task, TrainingError, fit
+from .loop import CHECKPOINT, Schedule, Task, TrainingError, fit, write_whole
 
 PROGRAM = "python -m lib.training"
 TOLD = ("loss", "reward", "val_loss", "val_cd", "val_iou")  # of the figures of an epoch, if it has them
+MOST_THREADS = 1024  # PyTorch crashes where it cannot make so many
 PRECISIONS = ("32-true", "bf16-mixed")  # as Lightning Fabric names them
 
 
@@ -126,8 +127,8 @@ def _parser(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
 
 
 def _train(command: Command, options: argparse.Namespace, folder: Path, line: str) -> None:
-    if options.threads < 1:
-        raise TrainingError(f"threads is {options.threads}; expected at least 1")
+    if not 1 <= options.threads <= MOST_THREADS:
+        raise TrainingError(f"threads is {options.threads}; expected 1 to {MOST_THREADS}")
     torch.set_num_threads(options.threads)
     fabric = fabric_of_this_run(options.precision)
     job = command.job(options)
@@ -146,7 +147,7 @@ def _train(command: Command, options: argparse.Namespace, folder: Path, line: st
         save(job.network, path)
         job.finish(path)
         facts = _facts(job, log, fabric, line, options.precision)
-        path.with_suffix(".json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+        write_whole(path.with_suffix(".json"), json.dumps(facts, indent=2) + "\n")
         print(f"weights: {path}; how they came to be: {path.with_suffix('.json')}")
 
 

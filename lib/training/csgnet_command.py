@@ -10,8 +10,9 @@ import torch
 from jaxtyping import Int
 from torch import Tensor
 
+from ..datasets import DataError
 from ..datasets.csg import TokenSet, csg_programs
-from ..models.csgnet import CSGNet, CSGNetConfig
+from ..models.csgnet import CSGNet, CSGNetConfig, check_reader
 from ..models.weights import load
 from .commands import Command, Job, Setting
 from .csgnet import ParseTask, Teacher
@@ -37,6 +38,7 @@ SETTINGS = (
     ),
 )
 SCRATCH = "scratch"  # where a network begins that has learned nothing
+MOST = 10**8  # programs an epoch
 VALIDATED = 1000  # programs that are scored after every epoch
 
 
@@ -55,10 +57,10 @@ def folder(options: argparse.Namespace) -> Path:
 
 def job(options: argparse.Namespace) -> Job:
     """CSGNet on the training programs; some of validation are scored after every epoch."""
-    if not 0 <= options.curriculum <= 1 or options.programs < 1:
+    if not 0 <= options.curriculum <= 1 or not 1 <= options.programs <= MOST:
         raise TrainingError(
             f"curriculum is {options.curriculum}, programs {options.programs}; "
-            "expected a share from 0 to 1, and 1 or more"
+            f"expected a share from 0 to 1, and 1 to {MOST}"
         )
     for name in ("in_order", "sharing"):
         if (value := getattr(options, name)) not in (0, 1):
@@ -67,6 +69,10 @@ def job(options: argparse.Namespace) -> Job:
     schedule = Schedule(**{name: getattr(options, name) for name in names})
     programs = csg_programs(options.dimensions, "train")
     others = evenly(csg_programs(options.dimensions, "val"), VALIDATED)
+    if not len(programs) or not len(others):
+        raise DataError(
+            f"there are {len(programs)} programs to learn from, {len(others)} to test; expected some of both"
+        )
     torch.manual_seed(options.seed)
     network, begun = begin(options, options.dimensions)
     if options.sharing:
@@ -95,11 +101,10 @@ def begin(options: argparse.Namespace, dimensions: int) -> tuple[CSGNet, str]:
         return CSGNet((CSGNetConfig.paper if options.paper else CSGNetConfig.compact)(dimensions)), SCRATCH
     path = Path(options.start)
     network = load(CSGNet, path)
-    if network.config.dimensions != dimensions:
-        spaces = {2: "the plane", 3: "space"}
-        raise TrainingError(
-            f"{path}: found a network of {spaces[network.config.dimensions]}; expected one of {spaces[dimensions]}"
-        )
+    try:
+        check_reader(network, dimensions)
+    except ValueError as error:
+        raise TrainingError(f"{path}: {error}") from error
     return network, hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 

@@ -236,6 +236,14 @@ def _rounded(figures: dict[str, float]) -> dict[str, float]:
 
 
 def _write_log(path: Path, log: list[dict]) -> None:
+    write_whole(path, "".join(json.dumps(row) + "\n" for row in log))
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file in one step: a killed run, or a full disk, never leaves half of it under its name."""
     part = path.with_name(path.name + ".part")
-    part.write_text("".join(json.dumps(row) + "\n" for row in log), encoding="utf-8")
-    part.replace(path)
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

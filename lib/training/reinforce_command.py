@@ -65,7 +65,8 @@ def job(options: argparse.Namespace) -> Job:
             f"there are {len(images)} pictures to learn from, {len(others)} to test; expected some of both"
         )
     torch.manual_seed(options.seed)
-    options.start = options.start or str(pretrained("csgnet_2d"))
+    if options.start is None:
+        options.start = str(pretrained("csgnet_2d"))
     network, begun = begin(options, dimensions=2)
     about = {
         "data": _digest(images), "start": begun, "samples": options.samples, "baseline": options.baseline,

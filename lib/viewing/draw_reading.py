@@ -15,7 +15,7 @@ from lib.finding.picture_choice import best_of
 from lib.finding.picture_refining import LEAST_GAIN, MOST_SWEEPS, refine
 from lib.interpreters.csg import Program, vocabulary_of
 from lib.interpreters.threads import one_thread
-from lib.models.csgnet import SIDE, CSGNet
+from lib.models.csgnet import SIDE, CSGNet, check_reader
 from lib.models.csgnet_beams import beam_search
 from lib.viewing.canvas import image_of
 
@@ -52,10 +52,7 @@ def check_network(network: CSGNet) -> None:
     """Raises TypeError for what is no CSGNet, ValueError for one of space or with another vocabulary."""
     if not isinstance(network, CSGNet):
         raise TypeError(f"found a {type(network).__name__}; expected a CSGNet")
-    words = vocabulary_of(2).stop + 1
-    if (network.config.dimensions, network.config.tokens) != (2, words):
-        found = f"{network.config.dimensions} dimensions and {network.config.tokens} tokens"
-        raise ValueError(f"found a network of {found}; expected one of the plane, 2 and {words}")
+    check_reader(network, 2)
 
 
 def drawing_of(picture) -> Bool[Tensor, "64 64"]:

@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from PIL import Image
 from torch import Tensor
 
@@ -132,9 +133,11 @@ def long_runs_figure(runs: Sequence[Mapping]) -> Figure:
             epochs, values = zip(*((row["epoch"], row[quantity]) for row in run["log"]))
             ax.plot(epochs, values, color=color, linewidth=1.8, marker=".", label=run["name"])
         ax.set(xlabel="epoch", ylabel=label)
-        ax.set_ylim(0, None)
-    axes[0].legend(fontsize=8, frameon=False)
-    axes[0].set_title("pictures they do not learn from, likeliest token each time", fontsize=10, loc="left")
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes[0].set_ylim(0, 1)
+    axes[1].set_ylim(0, None)
+    axes[1].legend(fontsize=8, frameon=False)
+    figure.suptitle("pictures they do not learn from, likeliest token each time", fontsize=10)
     figure.tight_layout()
     return figure
 

@@ -30,6 +30,7 @@ from tqdm import tqdm
 
 from data_scripts import mask_files
 from data_scripts.ending import exit_code
+from data_scripts.made_files import is_made
 from data_scripts.mask_files import Drawn
 from data_scripts.packages import Package, obtain
 from lib.datasets import DataError, data_root
@@ -99,7 +100,7 @@ def make(options: argparse.Namespace) -> str:
     wanted = mask_files.settings(PACKAGE.digest, CODE) | {"drawn_by": f"resvg-py {resvg_py.__version__}"}
     del wanted["split_shares"]  # all are for testing
     path = options.out / "logos.npz"
-    if mask_files.is_made(options.out, "logos", wanted):
+    if is_made(options.out, "logos", wanted):
         line = f"{path} is complete and up to date: nothing to do"
     else:
         found = icons(obtain(PACKAGE, options.package, data_root() / "downloads"))

@@ -4,12 +4,10 @@
     SOURCE.json       how many masks, of what, what was left out and why, licence, credits, and the settings
     SOURCE-VIEW.png   a contact sheet: 96 masks, evenly over the set
 
-The .json is written last. It has the .npz file's SHA-256, so the two tell whether all is there and up to date.
+How the two tell whether all is there and up to date: see `made_files`.
 """
 
-import hashlib
 import io
-import json
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -19,7 +17,7 @@ import matplotlib.image
 import numpy as np
 
 from data_scripts.journal import write_whole
-from lib.datasets import REPOSITORY
+from data_scripts.made_files import code_of, write_made
 from lib.datasets.images import BLANK, COLUMNS, FULL, SHARES, SPLITS, ImageSet, fault, in_one_split
 from lib.interpreters.rasterising import FILL, SAMPLES, SIZE
 
@@ -41,9 +39,6 @@ class Drawn:
 
 def settings(made_of: str, code: Iterable[str]) -> dict:
     """What decides what comes out; `code` are patterns of the repository's files that draw the masks."""
-    total = hashlib.sha256()
-    for path in sorted(path for pattern in code for path in REPOSITORY.glob(pattern)):
-        total.update(path.read_bytes())
     return {
         "made_of": made_of,
         "size": SIZE,
@@ -52,28 +47,8 @@ def settings(made_of: str, code: Iterable[str]) -> dict:
         "blank_up_to": BLANK,
         "full_above": FULL,
         "split_shares": list(SHARES),
-        "code": total.hexdigest()[:12],
+        "code": code_of(code),
     }
-
-
-def is_made(folder: Path, source: str, settings: dict) -> bool:
-    """Are the files there, whole, and made with these settings?"""
-    try:
-        report = json.loads((folder / f"{source}.json").read_text(encoding="utf-8"))
-        content = (folder / f"{source}.npz").read_bytes()
-    except (OSError, ValueError):
-        return False
-    whole = report.get("sha256") == hashlib.sha256(content).hexdigest()
-    return whole and report.get("settings") == settings
-
-
-def replaces(folder: Path, source: str, settings: dict) -> bool:
-    """Would making these masks replace ones that were made of something else, such as more furniture?"""
-    try:
-        report = json.loads((folder / f"{source}.json").read_text(encoding="utf-8"))
-        return report["settings"]["made_of"] != settings["made_of"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
 
 
 def write(folder: Path, source: str, shapes: Iterable[Drawn], facts: dict) -> dict:
@@ -95,13 +70,11 @@ def write(folder: Path, source: str, shapes: Iterable[Drawn], facts: dict) -> di
     keep = in_one_split(packed, columns["splits"])
     left_out |= {f"{rows[k][0]} {rows[k][1]}": ELSEWHERE for k in np.flatnonzero(~keep)}
     images = ImageSet(packed, columns, source).rows(np.flatnonzero(keep).tolist())
-    content = _npz(images)
-    report = {"source": source, "shapes": number, **_counts(images, left_out), **facts}
-    report |= {"sha256": hashlib.sha256(content).hexdigest(), "left_out": left_out}
+    counts = _counts(images, left_out)
+    report = {"source": source, "shapes": number, **counts, **facts, "left_out": left_out}
     for sheet in folder.glob(f"{source}-*.png"):
         sheet.unlink()  # it shows other masks
-    write_whole(folder / f"{source}.npz", content)
-    write_whole(folder / f"{source}.json", (json.dumps(report, indent=1, ensure_ascii=False) + "\n").encode())
+    write_made(folder, source, _npz(images), report)
     return report
 
 

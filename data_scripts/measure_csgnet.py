@@ -58,7 +58,7 @@ COUNTS = {
 }
 BEAMS = (1, 5, 10)
 SWEEPS = (0, 1, 2, 4, 10, None)  # iterations of refinement; None: until nothing gets better
-POWELL = 50  # silhouettes that are refined by Powell's method too, which is slow
+POWELL = 25  # silhouettes that are refined by Powell's method too, which is slow
 QUICK = 16
 AT_ONCE = 100  # shapes whose beams are searched together
 DECIDING = ("interpreters", "models", "metrics", "finding")  # parts of lib that the numbers come from

@@ -9,7 +9,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from data_scripts import make_silhouettes, mask_files, packages, sweethome
+from data_scripts import made_files, make_silhouettes, mask_files, packages, sweethome
 from data_scripts.mask_files import Drawn
 from lib import datasets
 from lib.datasets import CATEGORIES
@@ -200,16 +200,16 @@ def test_ctrl_c_leaves_nothing_half(root, monkeypatch, capsys):
 
 
 def test_a_kill_between_the_two_files_is_noticed(root, monkeypatch):
-    write_whole = mask_files.write_whole
+    write_whole = made_files.write_whole
 
     def killed(path, content):
         if path.suffix == ".json":
             raise KeyboardInterrupt
         write_whole(path, content)
 
-    monkeypatch.setattr(mask_files, "write_whole", killed)
+    monkeypatch.setattr(made_files, "write_whole", killed)
     assert furniture(root) == 130
-    monkeypatch.setattr(mask_files, "write_whole", write_whole)
+    monkeypatch.setattr(made_files, "write_whole", write_whole)
     assert [path.name for path in root.rglob("*.*")] == ["furniture.npz"]
     assert furniture(root) == 0 and report(root, "furniture")["masks"] == len(
         datasets.silhouettes("furniture")

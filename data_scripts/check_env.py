@@ -15,7 +15,7 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 PYPROJECT = Path(__file__).parents[1] / "pyproject.toml"
-IMPORTED_AS = {"scikit-image": "skimage"}  # packages whose modules have another name
+IMPORTED_AS = {"libigl": "igl", "scikit-image": "skimage"}  # packages whose modules have another name
 
 
 class Row(NamedTuple):

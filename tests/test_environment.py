@@ -11,7 +11,7 @@ from data_scripts import check_env
 
 ROOT = Path(__file__).parents[1]
 CONDA_NAME = {"torch": "pytorch", "matplotlib": "matplotlib-base"}
-FROM_PIP_ALONE = {"embreex", "latex2mathml", "manifold3d", "rtree"}  # `-e .` installs these
+FROM_PIP_ALONE = {"embreex", "latex2mathml", "libigl", "manifold3d", "rtree"}  # `-e .` installs these
 
 
 def ranges(requirements):

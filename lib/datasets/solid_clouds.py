@@ -7,22 +7,22 @@ How they are sampled is told in `solid_sampling`, how split in `images`. Coordin
 diagonal 1 they are right to 0.0001, a hundredth of the distance between 2,048 points on its surface.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import torch
-import trimesh
 from jaxtyping import Float
 from torch import Tensor
 
 from lib.furniture import make
+from lib.interpreters.cuboids import Cuboids
 from lib.interpreters.stump import Stump, execute
 
 from .base import CATEGORIES, DataError, choose, data_root, read_arrays
 from .images import SPLITS, split_of
-from .solid_sampling import SolidSample, sample_solid
+from .solid_sampling import Contains, SolidSample, by_winding, sample_solid
 from .solids import SOLIDS, solid
 
 SOURCES = ("shapeassembly", "furniture", "sweethome3d", "csg")  # what data_scripts.make_solids knows
@@ -170,20 +170,14 @@ def embedded() -> SolidSet:
         for seed in range(EMBEDDED):
             name = f"{category}-{seed:06d}"
             graph = make(category, seed)
-            sample = sampled(graph.mesh(), graph.leaves.contains, **SIZES)
+            sample = sample_solid(graph.mesh(), in_boxes(graph.leaves), **SIZES)
             rows.append((name, split_of(name), category, sample))
     for name in SOLIDS:
-        shape = execute(Stump.from_tree(solid(name)))
-        rows.append((name, "test", "everyday", sampled(shape.mesh(), shape.occupancy, **SIZES)))
+        mesh = execute(Stump.from_tree(solid(name))).mesh()
+        rows.append((name, "test", "everyday", sample_solid(mesh, by_winding(mesh), **SIZES)))
     return gathered(rows, "embedded")
 
 
-def sampled(
-    mesh: trimesh.Trimesh, occupancy: Callable[[Tensor], Tensor], points: int, queries: int, seed: int = 0
-) -> SolidSample:
-    """Samples of a shape with this mesh and this `occupancy(points)`. Raises DataError, see `sample_solid`."""
-
-    def contains(places: np.ndarray) -> np.ndarray:
-        return occupancy(torch.from_numpy(places)).numpy()
-
-    return sample_solid(mesh, contains, points, queries, seed)
+def in_boxes(boxes: Cuboids) -> Contains:
+    """Which points are in one of the boxes, or on it: exact, and faster than `by_winding`."""
+    return lambda places: boxes.contains(torch.from_numpy(places)).numpy()

@@ -9,6 +9,7 @@ next to nothing.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import igl
 import numpy as np
 import trimesh
 from jaxtyping import Bool, Float
@@ -17,7 +18,7 @@ from .base import DataError
 
 AROUND = 1.1  # the candidates' box, as a multiple of the bounding box
 NEAR = 0.02  # standard deviation of the distance from the surface, in diagonals
-SKIN = 1e-4  # diagonals: a face with the solid so close in front of it lies inside of another part
+SKIN = 1e-4  # diagonals: so far in front of a face, and behind it, one looks whether the solid is there
 ROUNDS = 40  # of candidates; a solid that needs more is hardly one
 
 Contains = Callable[[Float[np.ndarray, "m 3"]], Bool[np.ndarray, " m"]]
@@ -35,9 +36,10 @@ class SolidSample:
 def sample_solid(
     mesh: trimesh.Trimesh, contains: Contains, points: int = 2048, queries: int = 4096, seed: int = 0
 ) -> SolidSample:
-    """Samples of the solid that `mesh` bounds, with outward faces; parts may overlap: faces inside others are left out.
+    """Samples of the solid that the faces of `mesh` bound, whichever way they are turned, among others: faces with the
+    solid on both sides, inside of another part, are left out, and so are those of sheets without it on any side.
 
-    contains  tells of points (m, 3), in the mesh's coordinates, whether they are in the solid
+    contains  tells of points (m, 3), in the mesh's coordinates, whether they are in the solid; see `by_winding`
     Raises DataError for a mesh without extent, and where no points are found inside, outside or on it.
     """
     if not len(mesh.faces) or not np.isfinite(mesh.bounds).all() or not np.ptp(mesh.bounds, axis=0).any():
@@ -58,6 +60,20 @@ def sample_solid(
     return SolidSample(surface[:, :3], surface[:, 3:], np.concatenate([within, beyond]))
 
 
+def by_winding(mesh: trimesh.Trimesh) -> Contains:
+    """Where the mesh winds around a point: its generalised winding number is nearer to 1, or -1, than to 0.
+
+    That is the inside of a closed mesh, overlapping parts included, and a sensible guess for one with gaps (Jacobson et
+    al. 2013; computed as by Barill et al. 2018).
+    """
+    corners, faces = np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+
+    def contains(places: np.ndarray) -> np.ndarray:
+        return np.abs(igl.fast_winding_number(corners, faces, np.array(places, dtype=np.float64))) > 0.5
+
+    return contains
+
+
 def _enough(draw: Callable[[], list[np.ndarray]], wanted: dict[str, int]) -> list[np.ndarray]:
     """Rows of several kinds, drawn until there are enough of each; the first ones."""
     rounds: list[list[np.ndarray]] = []
@@ -71,10 +87,12 @@ def _enough(draw: Callable[[], list[np.ndarray]], wanted: dict[str, int]) -> lis
 
 
 def _on_surface(mesh: trimesh.Trimesh, inside: Contains, count: int, rng) -> list[np.ndarray]:
-    """Points of the mesh and their faces' normals side by side, those left out that are inside another part."""
+    """Points of the mesh and directions out of the solid side by side, where the solid is on one side of the face."""
     points, faces = trimesh.sample.sample_surface(mesh, 2 * count, seed=int(rng.integers(2**31)))
     normals = mesh.face_normals[faces]
-    return [np.concatenate([points, normals], 1)[~inside(points + SKIN * normals)]]
+    in_front, behind = inside(points + SKIN * normals), inside(points - SKIN * normals)
+    outward = np.where(in_front[:, None], -normals, normals)
+    return [np.concatenate([points, outward], 1)[in_front != behind]]
 
 
 @dataclass(frozen=True)

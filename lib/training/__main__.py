@@ -5,13 +5,19 @@ On several processes or GPUs:   fabric run --devices 2 lib/training/__main__.py 
 
 import sys
 
-from lib.training import csgnet_command, program_vae_command, reinforce_command  # absolute: for `fabric run`
+from lib.training import (  # absolute: for `fabric run`
+    csgnet_command,
+    program_vae_command,
+    reinforce_command,
+    stump_net_command,
+)
 from lib.training.commands import main
 
 COMMANDS = {
     "program_vae": program_vae_command.COMMAND,
     "csgnet": csgnet_command.COMMAND,
     "csgnet_reinforce": reinforce_command.COMMAND,
+    "stump_net": stump_net_command.COMMAND,
 }
 
 if __name__ == "__main__":

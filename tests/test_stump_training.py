@@ -1,0 +1,175 @@
+"""CSG-Stump Net learns: both terms of the loss by hand, the same bits after a stop, the command."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from lib.datasets.solid_clouds import gathered
+from lib.datasets.solid_sampling import SolidSample
+from lib.interpreters.stump import Box, Sphere
+from lib.models.soft_stump import SoftStump
+from lib.models.stump_net import StumpNet, StumpNetConfig
+from lib.models.weights import load
+from lib.training import commands
+from lib.training.__main__ import COMMANDS
+from lib.training.loop import CHECKPOINT, LOG, Schedule, fit
+from lib.training.stump_net import Lesson, Student, StumpTask, iou, pulled, use
+from tests.conftest import unchecked
+
+TINY = StumpNetConfig(8, 4, rank=3, feature=8, widths=(8, 8), neighbours=3, norm="layer")
+LESSON = Lesson(points=12, queries=16)
+
+
+@pytest.fixture(autouse=True)
+def embedded(tmp_path, monkeypatch):
+    """No data but what is made on the spot, and no shape checks: other tests have them."""
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path / "none"))
+    with unchecked():
+        yield
+
+
+def balls(count: int, seed: int = 0):
+    """Balls of different sizes about the origin."""
+    rng, rows = np.random.default_rng(seed), []
+    for k in range(count):
+        radius = rng.uniform(0.1, 0.25)
+        normals = rng.normal(size=(20, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        queries = np.concatenate([normals * radius * 0.5, normals * radius * 1.8])
+        rows.append((f"b{k}", "train", "ball", SolidSample(normals * radius, normals, queries)))
+    return gathered(rows, "balls")
+
+
+def task_of(seed: int = 0, lesson: Lesson = LESSON) -> StumpTask:
+    torch.manual_seed(seed)
+    return StumpTask(Student(StumpNet(TINY), lesson), balls(6), balls(3, seed=1), {})
+
+
+def test_the_second_term_by_hand():
+    """Two primitives, three points: one contains a point, one does not."""
+    distances = torch.tensor([[[-0.3, 0.1, 0.4], [0.5, 0.2, 0.6]]])
+    assert pulled(distances, "paper").item() == pytest.approx((0.1**2 + 0.2**2) / 2)
+    assert pulled(distances, "authors").item() == pytest.approx((0.3**2 + 0.2**2) / 2)
+
+
+def test_the_loss_is_both_terms():
+    task = task_of(lesson=Lesson(points=20, queries=40, weight=0.5))
+    loss, terms = task.loss(task.network, [2, 0], torch.Generator().manual_seed(0), 0.0)
+    clouds = task.train.points[[2, 0]].float()
+    said = task.module.network(clouds)
+    distances = said.distances(task.train.queries[[2, 0]].float())
+    found = said.occupancy(distances, 1.0)
+    expected = (found - task.train.inside).square().mean()
+    assert terms["reconstruction"].item() == pytest.approx(expected.item(), abs=1e-6)
+    pull = distances.square().amin(2).mean()
+    assert terms["pull"].item() == pytest.approx(pull.item(), abs=1e-6)
+    assert loss.item() == pytest.approx((expected + 0.5 * pull).item(), abs=1e-6)
+
+
+def test_few_points_are_the_noises_choice():
+    task = task_of()
+    losses = [
+        task.loss(task.network, [0, 1], torch.Generator().manual_seed(seed), 0.0)[0].item()
+        for seed in (0, 0, 1)
+    ]
+    assert losses[0] == losses[1] != losses[2]
+
+
+def test_the_sigmoid_gets_steeper_in_the_second_half():
+    lesson = Lesson(steepest=9)
+    assert [lesson.steepness(p) for p in (0, 0.5, 0.75, 1)] == [1, 1, 5, 9]
+
+
+def test_overlap_and_use_by_hand():
+    inside = torch.tensor([True, True, False, False])
+    found = torch.tensor([[True, False, True, False], [True, True, False, False]])
+    assert iou(found, inside).tolist() == pytest.approx([1 / 3, 1])
+    shape = torch.zeros(1, 2, 3)
+    said = SoftStump(
+        (Box(shape + 0.1, shape), Sphere(shape[..., 0] + 0.4, shape)),
+        complement=torch.zeros(1, 4),
+        intersection=torch.tensor([[[9.0, -9], [9, -9], [-9, 9], [-9, -9]]]),
+        union=torch.tensor([[9.0, -9]]),
+    )
+    found = use(said)
+    assert (found["primitives"].item(), found["nodes"].item()) == (2, 1)
+    assert found["size"].item() == pytest.approx((6 * 0.1 + 2 * 0.4) / 8)
+    p = 1 / (1 + math.exp(-9))
+    assert found["entropy"].item() == pytest.approx(-p * math.log2(p) - (1 - p) * math.log2(1 - p), rel=1e-3)
+
+
+def test_it_learns_balls(tmp_path):
+    """A network of a moment on six balls: decided answers overlap most of other balls."""
+    task = task_of(lesson=Lesson(points=20, queries=40))
+    log = fit(task, Schedule(epochs=60, batch=6, rate=0.01, warmup=0.1, last=0.05), tmp_path)
+    assert log[-1]["reconstruction"] < 0.5 * log[0]["reconstruction"]
+    assert log[-1]["val_iou"] > 0.8 and abs(log[-1]["val_iou"] - log[-1]["val_soft_iou"]) < 0.1
+
+
+def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path):
+    schedule = Schedule(epochs=3, batch=4, rate=0.01, warmup=0.1)
+    whole = task_of()
+    fit(whole, schedule, tmp_path / "whole")
+
+    def stop(row):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fit(task_of(), schedule, tmp_path / "stopped", told=stop)
+    again = task_of(seed=7)  # its weights are those of the checkpoint
+    fit(again, schedule, tmp_path / "stopped")
+    for (name, one), other in zip(whole.network.state_dict().items(), again.network.state_dict().values()):
+        assert torch.equal(one, other), name
+
+
+def train(*options: object) -> int:
+    return commands.main(COMMANDS, ["stump_net", *map(str, options)])
+
+
+FEW = ["--epochs", 1, "--primitives", 8, "--nodes", 4, "--points", 16, "--queries", 32, "--batch", 40]
+
+
+def test_the_command_leaves_weights_and_facts(tmp_path, capsys):
+    assert train(*FEW, "--category", "chair", "--head", "linear", "--no_complement", "--out", tmp_path) == 0
+    assert "val_iou" in capsys.readouterr().out
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        CHECKPOINT, LOG, "stump_net.json", "stump_net.safetensors",
+    ]  # fmt: skip
+    network = load(StumpNet, tmp_path / "stump_net.safetensors")
+    assert (network.config.primitives, network.config.nodes, network.config.head) == (8, 4, "linear")
+    assert not network.config.complement
+    facts = json.loads((tmp_path / "stump_net.json").read_text())
+    assert facts["settings"]["lesson"]["pull"] == "paper" and facts["settings"]["lesson"]["power"] == 8
+    assert set(facts["losses"]) == {
+        *("loss", "reconstruction", "pull", "val_soft_iou", "val_iou"),
+        *("primitives", "nodes", "size", "entropy"),
+    }
+
+
+def test_the_papers_settings(tmp_path):
+    assert train("--paper", *FEW, "--category", "table", "--out", tmp_path) == 0
+    settings = json.loads((tmp_path / "stump_net.json").read_text())["settings"]
+    assert settings["rate"] == 1e-4 and settings["last"] == 1 and settings["network"]["norm"] == "batch"
+    assert settings["lesson"] | {"temperature": 20, "power": None, "steepest": 1} == settings["lesson"]
+
+
+@pytest.mark.parametrize(
+    "options, told",
+    [
+        (["--primitives", "6"], "TrainingError: found StumpNetConfig(primitives=6"),
+        (["--nodes", "0"], "TrainingError: found StumpNetConfig(primitives=8, nodes=0"),
+        (["--steepest", "0.5"], "TrainingError: found 16 points, 32 queries, weight 0.001, steepest 0.5"),
+        (["--queries", "1"], "TrainingError: found 16 points, 1 queries"),
+        (["--power", "-1"], "TrainingError: found a power of -1"),
+        (["--power", "0", "--temperature", "999"], "TrainingError: found a temperature of 999"),
+        (["--category", "spoon"], "DataError: there are 0 clouds to learn from, 0 to test, category spoon"),
+        (["--source", "shapenet"], "DataError: unknown source 'shapenet'"),
+    ],
+)
+def test_bad_options_are_told_in_one_line(tmp_path, capsys, options, told):
+    assert train(*FEW, *options, "--out", tmp_path / "run") == 1
+    error = capsys.readouterr().err
+    assert error.startswith(told) and error.count("\n") == 1 and not (tmp_path / "run").exists()

@@ -45,12 +45,12 @@ def _peak(temperature: float | None) -> float:
     step(drawn(2), temperature)  # what PyTorch loads on first use
     inputs = drawn()
     RESET.write_text("5")  # the peak starts anew
-    before = _kilobytes("VmRSS")
+    before = kilobytes("VmRSS")
     step(inputs, temperature)
-    return (_kilobytes("VmHWM") - before) / 1000
+    return (kilobytes("VmHWM") - before) / 1000
 
 
-def _kilobytes(key: str) -> int:
+def kilobytes(key: str) -> int:
     return next(int(line.split()[1]) for line in STATUS.read_text().splitlines() if line.startswith(key))
 
 

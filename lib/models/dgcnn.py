@@ -82,4 +82,4 @@ def nearest(x: Float[Tensor, "b n d"], k: int) -> Int[Tensor, "b n k"]:
 
 
 def _active(norm: nn.Module, x: Float[Tensor, "rows width"]) -> Float[Tensor, "rows width"]:
-    return nn.functional.leaky_relu(norm(x), SLOPE)
+    return nn.functional.leaky_relu(norm(x), SLOPE, inplace=True)

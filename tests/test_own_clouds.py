@@ -1,0 +1,90 @@
+"""A person's own file: meshes and clouds of every kind, what is cleaned away, and what is told of bad ones."""
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from lib.datasets import DataError
+from lib.datasets.own_clouds import cleaned, read_cloud
+
+
+@pytest.fixture
+def box() -> trimesh.Trimesh:
+    """Sides 2, 4, 4 about (10, 0, 0): diagonal 6."""
+    return trimesh.creation.box((2, 4, 4), trimesh.transformations.translation_matrix((10, 0, 0)))
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "stl", "off", "glb"])
+def test_meshes(box, tmp_path, kind):
+    path = tmp_path / f"box.{kind}"
+    box.export(path)
+    cloud = read_cloud(path, 500)
+    assert cloud.points.shape == (500, 3) and cloud.points.dtype == torch.float32
+    half = torch.tensor([1, 2, 2]) / 6
+    assert torch.allclose((cloud.points.abs() / half).amax(1), torch.ones(500), atol=0.03)
+    assert cloud.scale == pytest.approx(1 / 6, rel=0.02)
+    assert (cloud.back(cloud.points)[:, 0] - 10).abs().max() < 1.01
+    assert "12 triangles" in cloud.told and "has diagonal 1 now" in cloud.told
+
+
+def test_a_text_with_a_heading_and_more_columns(tmp_path):
+    points = np.random.default_rng(0).normal(size=(400, 3))
+    lines = ["x,y,z,red", *(f"{x},{y},{z},7" for x, y, z in points), "# the end", ""]
+    (tmp_path / "cloud.csv").write_text("\n".join(lines))
+    cloud = read_cloud(tmp_path / "cloud.csv", 100)
+    assert "A cloud of 400 points." in cloud.told
+    back = cloud.back(cloud.points.double()).numpy()
+    assert np.abs(back[:, None] - points[None]).max(2).min(1).max() < 1e-5  # they are some of these
+
+
+def test_a_cloud_without_faces(tmp_path):
+    points = np.random.default_rng(0).uniform(size=(60, 3))
+    trimesh.PointCloud(points).export(tmp_path / "cloud.ply")
+    cloud = read_cloud(tmp_path / "cloud.ply", 100)
+    assert len(cloud.points) == 100 and len(cloud.points.unique(dim=0)) == len(cleaned(points)[0]) > 55
+    assert "fewer than 100, so some come twice" in cloud.told
+
+
+def test_what_is_cleaned_away():
+    rng = np.random.default_rng(0)
+    shape = rng.uniform(size=(300, 3))
+    dirt = np.array([[np.nan, 0, 0], [np.inf, 1, 1], shape[0], shape[1], shape[2], [50, 50, 50]])
+    kept, told = cleaned(np.concatenate([shape, dirt]))
+    assert told == "2 not finite, 3 repeated, 1 far from all others"
+    assert np.array_equal(kept, np.unique(shape, axis=0))
+    assert cleaned(shape)[1] == ""
+
+
+def test_the_seed_decides(box, tmp_path):
+    box.export(tmp_path / "box.stl")
+    first, same, other = (read_cloud(tmp_path / "box.stl", 50, seed).points for seed in (0, 0, 1))
+    assert torch.equal(first, same) and not torch.equal(first, other)
+
+
+@pytest.mark.parametrize(
+    "name, content, told",
+    [
+        ("a.step", "x", "found a file .step; expected .obj, .ply"),
+        ("a", "x", "found a file without an ending"),
+        ("a.obj", "", "found 0 points that differ; expected a shape"),
+        ("a.ply", "ply nonsense", "cannot be read as ply"),
+        ("a.stl", "solid", "a.stl: "),
+        ("a.xyz", "1 2 3\n4 five 6\n", "line 2: found '4 five 6'; expected numbers"),
+        ("a.xyz", "1 2 3\n4 5\n", "line 2: found 2 numbers; expected x y z"),
+        ("a.xyz", "1 2 3\n" * 50, "found 1 points that differ"),
+        ("a.xyz", "nan nan nan\n" * 50, "found 0 points"),
+        ("a.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "found 1 triangles without area"),
+    ],
+)
+def test_files_that_show_no_shape(tmp_path, name, content, told):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(DataError, match=told):
+        read_cloud(tmp_path / name)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(DataError, match="cannot be read as obj"):
+        read_cloud(tmp_path / "none.obj")
+    with pytest.raises(DataError, match="found a count of 0"):
+        read_cloud(tmp_path / "none.obj", 0)

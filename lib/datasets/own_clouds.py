@@ -31,8 +31,10 @@ LARGEST = 1 << 28  # bytes of a file
 
 @dataclass(frozen=True)
 class OwnCloud:
-    """points: around the origin, their bounding box with diagonal 1, (file's point - middle) * scale each; told: what was
-    found and done, in sentences."""
+    """points: (file's point - middle) * scale each, around the origin, their bounding box with diagonal 1.
+
+    told: what was found and done, in sentences.
+    """
 
     points: Float[Tensor, "n 3"]
     middle: Float[Tensor, "3"]

@@ -20,7 +20,7 @@ POWER = 8.0  # of the soft layers' means, see interpreters.stump.powers
 
 @dataclass(frozen=True)
 class SoftStump:
-    """primitives: one batch (b, K/4) of each kind; the logits of the three matrices."""
+    """primitives: a batch (b, count) of each kind; the logits of the three matrices."""
 
     primitives: tuple[Primitive, ...]
     complement: Float[Tensor, "b k"]

@@ -2,7 +2,7 @@
 
     encoder      DGCNN: points -> feature
     decoder      linear layers: feature -> code
-    primitives   code -> sizes, translation and rotation of K primitives, a quarter of each kind
+    primitives   code -> sizes, translation and rotation of K primitives, as many of each kind
     connections  code -> logits of W_C (K), W_I (K, C) and W_U (C)
 
 A linear layer from the code to all K C logits of W_I is the paper's (head "linear"): at K = C = 256 it alone has 134
@@ -12,7 +12,9 @@ the code weigh the products of their numbers:
     logit_kc = sum_d p_kd g_d(code) n_cd
 
 Outputs are scaled to shapes of diagonal 1 around the origin, and a new network begins with something sensible: small
-primitives all over the place, and node c that selects primitive c and no other.
+primitives all over the place, node c that selects primitive c and no other, and a union of the nodes whose primitives
+have an end. With the head "own" it stays so, node c is primitive c: boxes alone are then a rival, volumetric primitives
+(Tulsiani et al. 2017).
 """
 
 from dataclasses import dataclass
@@ -21,32 +23,36 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from ..interpreters.stump import Box, Cone, Cylinder, Primitive, Sphere
+from ..interpreters.stump import KINDS, Primitive
 from .dgcnn import DGCNN
 from .soft_stump import SoftStump
 
-KINDS = (Box, Cylinder, Sphere, Cone)  # in this order, a quarter of the primitives each
-HEADS = ("low_rank", "linear")
+SOLID = ("box", "cylinder", "sphere", "cone")
+ENDLESS = ("cylinder", "cone")
+HEADS = ("low_rank", "linear", "own")
 CODE_SLOPE = 0.01  # of the decoder's leaky ReLU
 REACH = 0.5  # translations and sizes lie within
 STEEPEST = 2.0  # slope of a cone
-ON, OFF = 3.0, -3.0  # logits of W_I at first: 0.95 and 0.05
+ON, OFF = 3.0, -3.0  # logits of connections at first: 0.95 and 0.05
 
 
 @dataclass(frozen=True)
 class StumpNetConfig:
     """Sizes of the network; the defaults are the paper's, but for the head.
 
-    primitives, nodes   K, a multiple of 4, and C
-    head        "low_rank" or "linear", see above; rank: numbers of an embedding
+    primitives, nodes   K and C
+    kinds       of primitives; there are as many of each, in this order
+    head        "low_rank", "linear" or "own", see above; rank: numbers of an embedding
     feature, widths     of the encoder's output, and of the decoder's layers, the code last
     neighbours, norm    of the encoder, see DGCNN
     complement  False: no primitive is complemented, as in the authors' program
-    Raises ValueError for other heads, sizes below 1, and K that is no multiple of 4.
+    Raises ValueError for other heads and kinds, sizes below 1, K that the kinds do not divide, and for the head "own"
+    with another C than K.
     """
 
     primitives: int = 256
     nodes: int = 256
+    kinds: tuple[str, ...] = SOLID
     head: str = "low_rank"
     rank: int = 256
     feature: int = 256
@@ -58,8 +64,15 @@ class StumpNetConfig:
     def __post_init__(self) -> None:
         if self.head not in HEADS:
             raise ValueError(f"found the head {self.head!r}; expected one of {', '.join(HEADS)}")
-        if min(self.primitives, self.nodes, self.rank, self.feature, *self.widths) < 1 or self.primitives % 4:
-            raise ValueError(f"found {self}; expected sizes of at least 1, and primitives a multiple of 4")
+        if not self.kinds or not set(self.kinds) <= set(SOLID):
+            raise ValueError(f"found the kinds {self.kinds}; expected some of {', '.join(SOLID)}")
+        if min(self.primitives, self.nodes, self.rank, self.feature, *self.widths) < 1:
+            raise ValueError(f"found {self}; expected sizes of at least 1")
+        if self.primitives % len(self.kinds) or self.head == "own" and self.nodes != self.primitives:
+            found = f"{self.primitives} primitives of {len(self.kinds)} kinds, {self.nodes} nodes, head {self.head!r}"
+            raise ValueError(
+                f"found {found}; expected as many of each kind, and with the head 'own' as many nodes"
+            )
 
     @staticmethod
     def compact(primitives: int = 64, nodes: int = 64) -> "StumpNetConfig":
@@ -76,12 +89,18 @@ class StumpNet(nn.Module):
         self.encoder = DGCNN(config.feature, config.neighbours, config.norm)
         self.decoder = _decoder(config.feature, *config.widths)
         code = config.widths[-1]
-        self.primitives = nn.ModuleList(PrimitiveHead(kind, code, config.primitives // 4) for kind in KINDS)
+        each = config.primitives // len(config.kinds)
+        self.primitives = nn.ModuleList(PrimitiveHead(KINDS[kind], code, each) for kind in config.kinds)
         self.to_complement = _quiet(code, config.primitives, OFF) if config.complement else None
         self.to_intersection = _connections(config)
-        self.to_union = _quiet(code, config.nodes, 0.0)
-        first = torch.full((config.primitives, config.nodes), OFF)
-        first[torch.arange(config.nodes) % config.primitives, torch.arange(config.nodes)] = ON
+        self.to_union = _quiet(code, config.nodes)
+        own = torch.arange(config.nodes) % config.primitives  # the primitive that each node selects at first
+        has_end = torch.tensor([kind not in ENDLESS for kind in config.kinds]).repeat_interleave(each)
+        with torch.no_grad():
+            self.to_union.bias.copy_(torch.where(has_end[own], ON, OFF))
+        on, off = (torch.inf, -torch.inf) if config.head == "own" else (ON, OFF)
+        first = torch.full((config.primitives, config.nodes), off)
+        first[own, torch.arange(config.nodes)] = on
         self.register_buffer("first", first, persistent=False)
 
     def forward(self, points: Float[Tensor, "b n 3"]) -> SoftStump:
@@ -92,7 +111,10 @@ class StumpNet(nn.Module):
             complement = code.new_full((len(code), self.config.primitives), -torch.inf)
         else:
             complement = self.to_complement(code)
-        return SoftStump(primitives, complement, self.first + self.to_intersection(code), self.to_union(code))
+        intersection = self.first.expand(len(code), -1, -1)
+        if self.to_intersection is not None:
+            intersection = intersection + self.to_intersection(code)
+        return SoftStump(primitives, complement, intersection, self.to_union(code))
 
 
 class PrimitiveHead(nn.Module):
@@ -109,7 +131,7 @@ class PrimitiveHead(nn.Module):
         self.numbers = _quiet(code, count * sum(self.widths.values()))
         with torch.no_grad():
             bias = self.numbers.bias.view(count, -1)
-            bias[:, :4] = _turns(count) if kind in (Cylinder, Cone) else torch.tensor([1.0, 0, 0, 0])
+            bias[:, :4] = _turns(count) if kind.name in ENDLESS else torch.tensor([1.0, 0, 0, 0])
             bias[:, 4:7].uniform_(-1, 1)
 
     def forward(self, code: Float[Tensor, "b code"]) -> Primitive:
@@ -141,7 +163,9 @@ class LowRank(nn.Module):
         return (self.of_primitives * self.weights(code).unsqueeze(1)) @ self.of_nodes.T
 
 
-def _connections(config: StumpNetConfig) -> nn.Module:
+def _connections(config: StumpNetConfig) -> nn.Module | None:
+    if config.head == "own":
+        return None
     code, shape = config.widths[-1], (config.primitives, config.nodes)
     if config.head == "low_rank":
         return LowRank(code, *shape, config.rank)

@@ -14,7 +14,7 @@ the code weigh the products of their numbers:
 Outputs are scaled to shapes of diagonal 1 around the origin, and a new network begins with something sensible: small
 primitives all over the place, node c that selects primitive c and no other, and a union of the nodes whose primitives
 have an end. With the head "own" it stays so, node c is primitive c: boxes alone are then a rival, volumetric primitives
-(Tulsiani et al. 2017).
+(Tulsiani et al. 2017), and superquadrics another (Paschalidou et al. 2019).
 """
 
 from dataclasses import dataclass
@@ -26,13 +26,16 @@ from torch import Tensor, nn
 from ..interpreters.stump import KINDS, Primitive
 from .dgcnn import DGCNN
 from .soft_stump import SoftStump
+from .superquadrics import Superquadric
 
 SOLID = ("box", "cylinder", "sphere", "cone")
+MADE_OF = KINDS | {"superquadric": Superquadric}
 ENDLESS = ("cylinder", "cone")
 HEADS = ("low_rank", "linear", "own")
 CODE_SLOPE = 0.01  # of the decoder's leaky ReLU
 REACH = 0.5  # translations and sizes lie within
 STEEPEST = 2.0  # slope of a cone
+SHARPEST, ROUNDEST = 0.2, 1.6  # exponents of a superquadric: from 0.2 to 1.8, at first 0.63
 ON, OFF = 3.0, -3.0  # logits of connections at first: 0.95 and 0.05
 
 
@@ -64,8 +67,10 @@ class StumpNetConfig:
     def __post_init__(self) -> None:
         if self.head not in HEADS:
             raise ValueError(f"found the head {self.head!r}; expected one of {', '.join(HEADS)}")
-        if not self.kinds or not set(self.kinds) <= set(SOLID):
-            raise ValueError(f"found the kinds {self.kinds}; expected some of {', '.join(SOLID)}")
+        if not self.kinds or not set(self.kinds) <= {*SOLID, "superquadric"}:
+            raise ValueError(
+                f"found the kinds {self.kinds}; expected some of {', '.join(SOLID)}, superquadric"
+            )
         if min(self.primitives, self.nodes, self.rank, self.feature, *self.widths) < 1:
             raise ValueError(f"found {self}; expected sizes of at least 1")
         if self.primitives % len(self.kinds) or self.head == "own" and self.nodes != self.primitives:
@@ -87,10 +92,10 @@ class StumpNet(nn.Module):
         super().__init__()
         self.config = config
         self.encoder = DGCNN(config.feature, config.neighbours, config.norm)
-        self.decoder = _decoder(config.feature, *config.widths)
+        self.decoder = decoder(config.feature, *config.widths)
         code = config.widths[-1]
         each = config.primitives // len(config.kinds)
-        self.primitives = nn.ModuleList(PrimitiveHead(KINDS[kind], code, each) for kind in config.kinds)
+        self.primitives = nn.ModuleList(PrimitiveHead(MADE_OF[kind], code, each) for kind in config.kinds)
         self.to_complement = _quiet(code, config.primitives, OFF) if config.complement else None
         self.to_intersection = _connections(config)
         self.to_union = _quiet(code, config.nodes)
@@ -144,6 +149,8 @@ class PrimitiveHead(nn.Module):
             return value
         if name == "translation":
             return REACH * value.tanh()
+        if name == "exponents":
+            return ROUNDEST * torch.sigmoid(value - 1) + SHARPEST
         most = STEEPEST if name == "slope" else REACH
         value = most * torch.sigmoid(value - 1.5)  # 0.18 of the most at first
         return value if self.kind.counts[name] > 1 else value.squeeze(-1)
@@ -172,7 +179,7 @@ def _connections(config: StumpNetConfig) -> nn.Module | None:
     return nn.Sequential(_quiet(code, config.primitives * config.nodes), nn.Unflatten(1, shape))
 
 
-def _decoder(*widths: int) -> nn.Sequential:
+def decoder(*widths: int) -> nn.Sequential:
     layers = []
     for wide, next_wide in zip(widths, widths[1:]):
         layers += [nn.Linear(wide, next_wide), nn.LeakyReLU(CODE_SLOPE)]

@@ -1,0 +1,122 @@
+"""CSG-Stump Net's rivals: superquadrics against balls and boxes, UCSG's layers against the tree that they choose."""
+
+import pytest
+import torch
+
+from lib.interpreters.stump import Box, Sphere
+from lib.models.soft_stump import SoftStump
+from lib.models.stump_net import StumpNet, StumpNetConfig
+from lib.models.superquadrics import Superquadric
+from lib.models.ucsg import UCSG, SoftTree, UCSGConfig
+from lib.models.weights import load, save
+
+TINY = UCSGConfig(each=3, layers=3, nodes=2, feature=8, widths=(8,), neighbours=3)
+
+
+def points(count: int = 300, seed: int = 0) -> torch.Tensor:
+    return torch.rand(count, 3, generator=torch.Generator().manual_seed(seed)).double() - 0.5
+
+
+def test_with_exponents_of_1_it_is_a_ball():
+    place = [0.1, -0.2, 0.05]
+    found = Superquadric([0.3] * 3, [1.0, 1.0], place).distance(points())
+    torch.testing.assert_close(found, Sphere(0.3, place).distance(points()), atol=1e-3, rtol=0)
+
+
+def test_with_small_exponents_it_is_nearly_a_box():
+    half, turn = [0.3, 0.2, 0.35], [0.9, 0.1, 0.3, -0.2]
+    box = Box(half, rotation=turn).distance(points(4000))
+    found = Superquadric(half, [0.1, 0.1], rotation=turn).distance(points(4000))
+    away = box.abs() > 0.02
+    assert ((found <= 0) == (box <= 0))[away].all()
+
+
+def test_an_ellipsoid_by_its_equation():
+    half = torch.tensor([0.4, 0.2, 0.1]).double()
+    found = Superquadric(half, [1.0, 1.0]).distance(points(2000))
+    assert torch.equal(found <= 0, ((points(2000) / half) ** 2).sum(1) <= 1)
+
+
+def test_gradients_are_finite_also_in_the_middle_and_on_axes():
+    numbers = torch.tensor([0.3, 0.2, 0.1, 0.2, 1.8]).requires_grad_()
+    places = torch.tensor([[0.0, 0, 0], [0.2, 0, 0], [0, 0, 1e-9], [0.5, 0.5, 0.5]]).requires_grad_()
+    distance = Superquadric(numbers[:3], numbers[3:]).distance(places)
+    assert distance.isfinite().all()
+    for gradient in torch.autograd.grad(distance.sum(), (numbers, places)):
+        assert gradient.isfinite().all()
+
+
+def test_a_network_of_superquadrics():
+    torch.manual_seed(0)
+    config = StumpNetConfig(
+        5, 5, ("superquadric",), "own", complement=False, feature=8, widths=(8,), neighbours=3
+    )
+    said = StumpNet(config)(points(2 * 30).float().view(2, 30, 3))
+    assert isinstance(said, SoftStump) and [type(batch) for batch in said.primitives] == [Superquadric]
+    exponents = said.primitives[0].exponents
+    assert exponents.shape == (2, 5, 2) and (exponents > 0.1).all() and (exponents < 2).all()
+    distances = said.distances(points(40).float().expand(2, -1, -1))
+    assert torch.equal(said.inside(distances), (distances <= 0).any(1))
+    assert said.occupancy(distances).isfinite().all()
+
+
+def hand_made(temperature: float = 1e-3, margin: float = 1e-4) -> SoftTree:
+    """Layer 1: node 0 is A with B, node 1 is B with C. The last: (A without B) or (B and C)."""
+    place = torch.zeros(1, 1, 3)
+    primitives = (
+        Box(torch.tensor([[[0.4, 0.4, 0.1]]]), place),
+        Sphere(torch.tensor([[0.25, 0.3]]), torch.tensor([[[0.0, 0, 0], [0.2, 0, 0]]])),
+    )
+    first, last = torch.zeros(1, 2, 3, 2), torch.zeros(1, 2, 4 * 2 + 3, 1)
+    for node, (left, right) in enumerate([(0, 1), (1, 2)]):
+        first[0, 0, left, node] = first[0, 1, right, node] = 1
+    last[0, 0, 2 * 2 + 0, 0] = 1  # l - r of node 0
+    last[0, 1, 1 * 2 + 1, 0] = 1  # l and r of node 1
+    return SoftTree(primitives, (first, last), torch.tensor(margin), torch.full((2,), temperature), None)
+
+
+def test_layers_choose_and_combine():
+    said, places = hand_made(), points(2000).float()
+    distances = said.distances(places[None])
+    a, b, c = distances[0] <= 0
+    expected = a & ~b | b & c
+    assert torch.equal(said.inside(distances)[0], expected)
+    soft = said.occupancy(distances)[0]
+    far = distances[0].abs().amin(0) > 1e-3
+    torch.testing.assert_close(soft[far], expected[far].float(), atol=1e-4, rtol=0)
+
+
+@pytest.fixture
+def network() -> UCSG:
+    torch.manual_seed(0)
+    return UCSG(TINY)
+
+
+def test_noise_is_off_unless_it_is_given(network):
+    clouds, places = points(60).float().view(2, 30, 3), points(50).float().expand(2, -1, -1)
+
+    def asked(noise):
+        said = network(clouds, noise)
+        return said.occupancy(said.distances(places))
+
+    assert torch.equal(asked(None), asked(None))
+    first, same, other = (asked(torch.Generator().manual_seed(seed)) for seed in (0, 0, 1))
+    assert torch.equal(first, same) and not torch.equal(first, other)
+
+
+def test_the_network(network, tmp_path):
+    clouds, places = points(60).float().view(2, 30, 3), points(50).float().expand(2, -1, -1)
+    said = network(clouds)
+    assert len(said) == 2
+    assert [tuple(each.shape) for each in said.choices] == [(2, 2, 6, 2), (2, 2, 14, 2), (2, 2, 14, 1)]
+    distances = said.distances(places)
+    assert distances.shape == (2, 6, 50) and said.inside(distances).shape == (2, 50)
+    (said.occupancy(distances) - 0.3).square().mean().backward()
+    assert all(weight.grad is not None for weight in network.parameters())
+    save(network, tmp_path / "net")
+    assert torch.equal(load(UCSG, tmp_path / "net")(clouds).choices[1], network.eval()(clouds).choices[1])
+
+
+def test_sizes_that_make_no_sense_are_refused():
+    with pytest.raises(ValueError, match="expected sizes of at least 1"):
+        UCSGConfig(layers=0)

@@ -13,7 +13,7 @@ import torch
 
 from lib.models.dgcnn import nearest
 from lib.models.stump_net import HEADS, StumpNet, StumpNetConfig
-from lib.training.stump_net import Lesson, Student
+from lib.training.stump_net import Lesson, StumpStudent
 from tests.bench_stump_layers import RESET, kilobytes
 from tests.timing import timed
 
@@ -26,17 +26,17 @@ def stepper(head: str, mean: str) -> Callable[[], float]:
     """What makes one step, and returns the loss."""
     torch.manual_seed(0)
     lesson = Lesson(2048, 2048, **MEANS[mean])
-    student = Student(StumpNet(StumpNetConfig(head=head)), lesson).train()
+    student = StumpStudent(StumpNet(StumpNetConfig(head=head)), lesson).train()
     descent = torch.optim.Adam(student.parameters(), 1e-4)
     clouds, queries = torch.rand(2, 1, 2048, 3) - 0.5
     inside = (torch.arange(2048) < 1024).float()
 
     def step() -> float:
-        reconstruction, pull = student(clouds, queries, inside, 1.0)
+        loss, _ = student(clouds, queries, inside, 0.0, torch.Generator())
         descent.zero_grad()
-        (reconstruction + lesson.weight * pull).backward()
+        loss.backward()
         descent.step()
-        return reconstruction.item()
+        return loss.item()
 
     return step
 

@@ -81,6 +81,10 @@ def test_layers_choose_and_combine():
     a, b, c = distances[0] <= 0
     expected = a & ~b | b & c
     assert torch.equal(said.inside(distances)[0], expected)
+    assert said.used().tolist() == [[True, True, True]]
+    said.choices[1][0, 1] = said.choices[1][0, 0]  # left and right the same: A without B
+    assert said.used().tolist() == [[True, True, False]]
+    said = hand_made()
     soft = said.occupancy(distances)[0]
     far = distances[0].abs().amin(0) > 1e-3
     torch.testing.assert_close(soft[far], expected[far].float(), atol=1e-4, rtol=0)

@@ -12,11 +12,14 @@ from lib.datasets.solid_sampling import SolidSample
 from lib.interpreters.stump import Box, Sphere
 from lib.models.soft_stump import SoftStump
 from lib.models.stump_net import StumpNet, StumpNetConfig
+from lib.models.ucsg import UCSG, UCSGConfig
 from lib.models.weights import load
 from lib.training import commands
 from lib.training.__main__ import COMMANDS
 from lib.training.loop import CHECKPOINT, LOG, Schedule, fit
-from lib.training.stump_net import Lesson, Student, StumpTask, iou, pulled, use
+from lib.training.solids import SolidTask, iou
+from lib.training.stump_net import Lesson, StumpStudent, pulled, use
+from lib.training.ucsg import UCSGLesson, UCSGStudent
 from tests.conftest import unchecked
 
 TINY = StumpNetConfig(8, 4, rank=3, feature=8, widths=(8, 8), neighbours=3, norm="layer")
@@ -43,9 +46,15 @@ def balls(count: int, seed: int = 0):
     return gathered(rows, "balls")
 
 
-def task_of(seed: int = 0, lesson: Lesson = LESSON) -> StumpTask:
+def task_of(seed: int = 0, lesson: Lesson = LESSON) -> SolidTask:
     torch.manual_seed(seed)
-    return StumpTask(Student(StumpNet(TINY), lesson), balls(6), balls(3, seed=1), {})
+    return SolidTask(StumpStudent(StumpNet(TINY), lesson), balls(6), balls(3, seed=1), {})
+
+
+def rival_of(seed: int = 0) -> SolidTask:
+    torch.manual_seed(seed)
+    student = UCSGStudent(UCSG(UCSGConfig(3, 2, 2, 8, (8,), 3)), UCSGLesson(20, 40))
+    return SolidTask(student, balls(6), balls(3, seed=1), {})
 
 
 def test_the_second_term_by_hand():
@@ -59,7 +68,7 @@ def test_the_loss_is_both_terms():
     task = task_of(lesson=Lesson(points=20, queries=40, weight=0.5))
     loss, terms = task.loss(task.network, [2, 0], torch.Generator().manual_seed(0), 0.0)
     clouds = task.train.points[[2, 0]].float()
-    said = task.module.network(clouds)
+    said = task.student.network(clouds)
     distances = said.distances(task.train.queries[[2, 0]].float())
     found = said.occupancy(distances, 1.0)
     expected = (found - task.train.inside).square().mean()
@@ -81,6 +90,11 @@ def test_few_points_are_the_noises_choice():
 def test_the_sigmoid_gets_steeper_in_the_second_half():
     lesson = Lesson(steepest=9)
     assert [lesson.steepness(p) for p in (0, 0.5, 0.75, 1)] == [1, 1, 5, 9]
+
+
+def test_surfaces_get_sharper_in_the_first_half():
+    lesson = Lesson(dullest=1.5)
+    assert [lesson.sharpness(p) for p in (0, 0.25, 0.5, 1)] == pytest.approx([1.5, 15, 150, 150])
 
 
 def test_overlap_and_use_by_hand():
@@ -109,7 +123,29 @@ def test_it_learns_balls(tmp_path):
     assert log[-1]["val_iou"] > 0.8 and abs(log[-1]["val_iou"] - log[-1]["val_soft_iou"]) < 0.1
 
 
-def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path):
+def test_the_rivals_loss_by_hand():
+    task = rival_of()
+    noise = torch.Generator().manual_seed(0)
+    loss, terms = task.loss(task.network, [0, 1], noise, 0.0)
+    assert terms["margin"].item() == 1 and terms["temperature"].item() == 0  # the margin is not narrow yet
+    reach, expected = terms["reach"].item(), terms["reconstruction"].item()
+    assert loss.item() == pytest.approx(expected + 0.1 * (1 + reach), abs=1e-6)
+    with torch.no_grad():
+        task.student.network.margin.fill_(-0.04)
+    _, terms = task.loss(task.network, [0, 1], noise, 0.0)
+    assert terms["margin"].item() == pytest.approx(0.04) and terms["temperature"].item() == 4
+
+
+def test_the_rival_learns_balls(tmp_path):
+    """Decided answers are good once the margin is narrow."""
+    log = fit(rival_of(), Schedule(epochs=400, batch=6, rate=0.01, warmup=0.05, last=0.05), tmp_path)
+    assert abs(log[-1]["margin_now"]) < 0.01 < log[0]["margin_now"]
+    assert log[-1]["reconstruction"] < 0.01 and log[-1]["val_iou"] > 0.75
+    assert 1 <= log[-1]["primitives"] <= 6
+
+
+@pytest.mark.parametrize("task_of", [task_of, rival_of])
+def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path, task_of):
     schedule = Schedule(epochs=3, batch=4, rate=0.01, warmup=0.1)
     whole = task_of()
     fit(whole, schedule, tmp_path / "whole")
@@ -125,11 +161,12 @@ def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path):
         assert torch.equal(one, other), name
 
 
-def train(*options: object) -> int:
-    return commands.main(COMMANDS, ["stump_net", *map(str, options)])
+def train(*options: object, name: str = "stump_net") -> int:
+    return commands.main(COMMANDS, [name, *map(str, options)])
 
 
-FEW = ["--epochs", 1, "--primitives", 8, "--nodes", 4, "--points", 16, "--queries", 32, "--batch", 40]
+LITTLE = ["--epochs", 1, "--points", 16, "--queries", 32, "--batch", 40]
+FEW = [*LITTLE, "--primitives", 8, "--nodes", 4]
 
 
 def test_the_command_leaves_weights_and_facts(tmp_path, capsys):
@@ -149,6 +186,18 @@ def test_the_command_leaves_weights_and_facts(tmp_path, capsys):
     }
 
 
+def test_rivals_are_commands_too(tmp_path):
+    options = [*FEW, "--nodes", 8, "--category", "chair"]
+    boxes, ovals = tmp_path / "boxes", tmp_path / "ovals"
+    assert train(*options, "--kinds", "box", "--head", "own", "--no_complement", "--out", boxes) == 0
+    assert train(*options, "--kinds", "superquadric", "--head", "own", "--out", ovals) == 0
+    assert load(StumpNet, boxes / "stump_net.safetensors").config.kinds == ("box",)
+    small = ["--each", 3, "--layers", 2, "--nodes", 2, "--category", "chair"]
+    assert train(*LITTLE, *small, "--out", tmp_path / "ucsg", name="ucsg") == 0
+    assert load(UCSG, tmp_path / "ucsg" / "ucsg.safetensors").config.each == 3
+    assert train(*LITTLE, "--layers", 0, "--out", tmp_path / "none", name="ucsg") == 1
+
+
 def test_the_papers_settings(tmp_path):
     assert train("--paper", *FEW, "--category", "table", "--out", tmp_path) == 0
     settings = json.loads((tmp_path / "stump_net.json").read_text())["settings"]
@@ -159,13 +208,14 @@ def test_the_papers_settings(tmp_path):
 @pytest.mark.parametrize(
     "options, told",
     [
-        (["--primitives", "6"], "TrainingError: found StumpNetConfig(primitives=6"),
+        (["--primitives", "6"], "TrainingError: found 6 primitives of 4 kinds"),
         (["--nodes", "0"], "TrainingError: found StumpNetConfig(primitives=8, nodes=0"),
+        (["--dullest", "151"], "TrainingError: found dullest 151; expected more than 0, at most 150"),
         (["--steepest", "0.5"], "TrainingError: found 16 points, 32 queries, weight 0.001, steepest 0.5"),
         (["--queries", "1"], "TrainingError: found 16 points, 1 queries"),
         (["--power", "-1"], "TrainingError: found a power of -1"),
         (["--power", "0", "--temperature", "999"], "TrainingError: found a temperature of 999"),
-        (["--category", "spoon"], "DataError: there are 0 clouds to learn from, 0 to test, category spoon"),
+        (["--category", "spoon"], "DataError: there are no train clouds of the category spoon"),
         (["--source", "shapenet"], "DataError: unknown source 'shapenet'"),
     ],
 )

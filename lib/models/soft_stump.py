@@ -40,10 +40,11 @@ class SoftStump:
         steepness: float = 1.0,
         power: float | None = POWER,
         temperature: float | None = None,
+        sharpness: float = SHARPNESS,
     ) -> Float[Tensor, "b m"]:
         """From 0 outside to 1 inside, of points with these distances; differentiable. See `layers.soft`."""
         matrices = [torch.sigmoid(steepness * logits) for logits in self.logits]
-        return layers.soft(torch.sigmoid(-SHARPNESS * distances), *matrices, temperature, power)[1]
+        return layers.soft(torch.sigmoid(-sharpness * distances), *matrices, temperature, power)[1]
 
     def inside(self, distances: Float[Tensor, "b k m"]) -> Bool[Tensor, "b m"]:
         """The same with all decided."""

@@ -80,9 +80,10 @@ class StumpNetConfig:
             )
 
     @staticmethod
-    def compact(primitives: int = 64, nodes: int = 64) -> "StumpNetConfig":
-        """A network that two cores can train."""
-        return StumpNetConfig(primitives, nodes, rank=128, widths=(256, 512), neighbours=12, norm="layer")
+    def compact(primitives: int = 64, nodes: int = 64, **others) -> "StumpNetConfig":
+        """A network that two cores can train; `others` are fields by name."""
+        small = {"rank": 128, "widths": (256, 512), "neighbours": 12, "norm": "layer"}
+        return StumpNetConfig(primitives, nodes, **small | others)
 
 
 class StumpNet(nn.Module):

@@ -89,6 +89,22 @@ class SoftTree:
             found = torch.cat([left | right, left & right, left & ~right, right & ~left, inside], 1)
         raise AssertionError("there is at least one layer")
 
+    def used(self) -> Bool[Tensor, "b k"]:
+        """Which primitives the decided tree chooses, directly or through layers in between."""
+        needed = torch.ones(
+            len(self), 1, dtype=torch.bool, device=self.margin.device
+        )  # nodes of the last layer
+        primitives = torch.zeros(len(self), self.choices[0].shape[2], dtype=torch.bool, device=needed.device)
+        for logits in reversed(self.choices):
+            chosen = torch.zeros(logits.shape[0], logits.shape[2], dtype=torch.bool, device=needed.device)
+            chosen = (
+                chosen.float().scatter_add(1, logits.argmax(2).flatten(1), needed.float().repeat(1, 2)).bool()
+            )
+            count = chosen.shape[1] - primitives.shape[1]  # outputs of the layer before
+            primitives |= chosen[:, count:]
+            needed = chosen[:, :count].unflatten(1, (4, count // 4)).any(1) if count else chosen[:, :0]
+        return primitives
+
 
 def _combined(left: Tensor, right: Tensor, union_only: bool) -> Tensor:
     union = (left + right).clamp(0, 1)

@@ -10,6 +10,7 @@ from lib.training import (  # absolute: for `fabric run`
     program_vae_command,
     reinforce_command,
     stump_net_command,
+    ucsg_command,
 )
 from lib.training.commands import main
 
@@ -18,6 +19,7 @@ COMMANDS = {
     "csgnet": csgnet_command.COMMAND,
     "csgnet_reinforce": reinforce_command.COMMAND,
     "stump_net": stump_net_command.COMMAND,
+    "ucsg": ucsg_command.COMMAND,
 }
 
 if __name__ == "__main__":

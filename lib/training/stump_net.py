@@ -6,24 +6,23 @@ The second term pulls every primitive's surface to the nearest test point, so th
 authors' program squares the minimum instead, which pulls only primitives that contain no point ("authors").
 
 Connections begin soft, W = sigmoid(logit). In the second half of a training the sigmoid gets steeper, so that in the
-end little is left to be decided when W becomes 0 or 1.
+end little is left to be decided when W becomes 0 or 1. In the first half surfaces get sharper, from `dullest` to the
+paper's 150: a dull surface is seen by more points, which can pull at it.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 from jaxtyping import Float
-from torch import Tensor, nn
+from torch import Tensor
 
-from ..datasets.solid_clouds import SolidSet
 from ..interpreters.stump.powers import HIGHEST
 from ..interpreters.stump.products import STEEPEST
-from ..models.soft_stump import SoftStump
+from ..models.soft_stump import SHARPNESS, SoftStump
 from ..models.stump_net import StumpNet
+from .solids import Student
 
 PULLS = ("paper", "authors")
-PER_REPORT = 20  # clouds at once when others are scored
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,7 @@ class Lesson:
     points, queries  of each cloud that are seen in a step, and asked about (half of these inside)
     pull        "paper" or "authors": how the second term is meant; weight: what it is multiplied with
     steepest    of the connections' sigmoid, at the end
+    dullest     of the surfaces' sigmoid, at the beginning
     power, temperature  of the soft layers: one of them, see interpreters.stump.layers
     Raises ValueError for another pull, and for numbers that make no sense.
     """
@@ -42,6 +42,7 @@ class Lesson:
     pull: str = "paper"
     weight: float = 1e-3
     steepest: float = 8.0
+    dullest: float = SHARPNESS
     power: float | None = 8.0
     temperature: float | None = None
 
@@ -53,6 +54,8 @@ class Lesson:
                 f"found {self.points} points, {self.queries} queries, weight {self.weight}, steepest {self.steepest}; "
                 "expected at least 1, 2, 0 and 1"
             )
+        if not 0 < self.dullest <= SHARPNESS:
+            raise ValueError(f"found dullest {self.dullest:g}; expected more than 0, at most {SHARPNESS:g}")
 
         if self.power is not None and not 0 < self.power <= HIGHEST:
             raise ValueError(f"found a power of {self.power:g}; expected more than 0, at most {HIGHEST:g}")
@@ -65,25 +68,40 @@ class Lesson:
         """Of the sigmoid when a share `progress` of all steps is done."""
         return 1 + (self.steepest - 1) * max(0.0, 2 * progress - 1)
 
+    def sharpness(self, progress: float) -> float:
+        """Of the surfaces; it grows by equal factors in equal times."""
+        return SHARPNESS * (self.dullest / SHARPNESS) ** max(0.0, 1 - 2 * progress)
 
-class Student(nn.Module):
-    """The network and what it is asked, as one module: clouds and points of space -> both terms of the loss."""
+
+class StumpStudent(Student):
+    """CSG-Stump Net and its lesson."""
 
     def __init__(self, network: StumpNet, lesson: Lesson):
         super().__init__()
         self.network, self.lesson = network, lesson
+        self.points, self.queries = lesson.points, lesson.queries
 
-    def forward(
-        self,
-        clouds: Float[Tensor, "b n 3"],
-        queries: Float[Tensor, "b q 3"],
-        inside: Float[Tensor, " q"],
-        steepness: float,
-    ) -> tuple[Float[Tensor, ""], Float[Tensor, ""]]:
-        said = self.network(clouds)
-        distances = said.distances(queries)
-        found = said.occupancy(distances, steepness, self.lesson.power, self.lesson.temperature)
-        return (found - inside).square().mean(), pulled(distances, self.lesson.pull)
+    def forward(self, clouds, asked, inside, progress, noise):
+        """See Student; the terms are "reconstruction" and "pull"."""
+        said, lesson = self.network(clouds), self.lesson
+        distances = said.distances(asked)
+        found = said.occupancy(
+            distances,
+            lesson.steepness(progress),
+            lesson.power,
+            lesson.temperature,
+            lesson.sharpness(progress),
+        )
+        reconstruction, pull = (found - inside).square().mean(), pulled(distances, lesson.pull)
+        return reconstruction + lesson.weight * pull, {"reconstruction": reconstruction, "pull": pull}
+
+    def soft(self, said, distances):
+        """See Student."""
+        return said.occupancy(distances, self.lesson.steepest, self.lesson.power, self.lesson.temperature)
+
+    def figures(self, said):
+        """See `use`."""
+        return use(said)
 
 
 def pulled(distances: Float[Tensor, "b k m"], pull: str) -> Float[Tensor, ""]:
@@ -91,71 +109,6 @@ def pulled(distances: Float[Tensor, "b k m"], pull: str) -> Float[Tensor, ""]:
     if pull == "paper":
         return distances.square().amin(2).mean()
     return distances.amin(2).square().mean()
-
-
-@dataclass
-class StumpTask:
-    """Learn the clouds of `train`; those of `other` are scored after every epoch. A `Task` for `lib.training.loop.fit`.
-
-    about  JSON: data and settings that must be the same when a run goes on
-    """
-
-    module: Student
-    train: SolidSet
-    other: SolidSet
-    about: dict
-
-    @property
-    def network(self) -> nn.Module:
-        return self.module
-
-    def __len__(self) -> int:
-        return len(self.train)
-
-    def loss(
-        self, network: nn.Module, picks: Sequence[int], noise: torch.Generator, progress: float
-    ) -> tuple[Tensor, dict[str, Tensor]]:
-        """The loss of some clouds; for the log its terms."""
-        lesson, device = self.module.lesson, next(network.parameters()).device
-        rows = torch.as_tensor(picks)
-        clouds = _some(self.train.points[rows], lesson.points, noise)
-        halves = [_some(half, lesson.queries // 2, noise) for half in self.train.queries[rows].chunk(2, 1)]
-        inside = torch.cat([torch.ones(halves[0].shape[1]), torch.zeros(halves[1].shape[1])])
-        asked = clouds.to(device), torch.cat(halves, 1).to(device), inside.to(device)
-        reconstruction, pull = network(*asked, lesson.steepness(progress))
-        told = {"reconstruction": reconstruction, "pull": pull}
-        return reconstruction + lesson.weight * pull, told
-
-    @torch.no_grad()
-    def report(self, network: nn.Module) -> dict[str, float]:
-        """Of the other clouds: IoU of the solids, told by their queries, soft and decided; how many primitives and
-        nodes the decided stumps use, and how undecided connections are, in bits."""
-        sums: dict[str, float] = {}
-        lesson, device = self.module.lesson, next(network.parameters()).device
-        for start in range(0, len(self.other), PER_REPORT):
-            some = self.other[start : start + PER_REPORT]
-            said = self.module.network(some.points[:, : lesson.points].float().to(device))
-            distances = said.distances(some.queries.float().to(device))
-            inside = some.inside.bool().to(device)
-            soft = said.occupancy(distances, lesson.steepest, lesson.power, lesson.temperature) > 0.5
-            rows = {
-                "val_soft_iou": iou(soft, inside),
-                "val_iou": iou(said.inside(distances), inside),
-                **use(said),
-            }
-            for name, values in rows.items():
-                sums[name] = sums.get(name, 0.0) + values.double().sum().item()
-        return {name: total / len(self.other) for name, total in sums.items()}
-
-
-def _some(points: Tensor, count: int, noise: torch.Generator) -> Float[Tensor, "b count 3"]:
-    """Some of each cloud's points, the same numbers of all."""
-    return points[:, torch.randperm(points.shape[1], generator=noise)[:count]].float()
-
-
-def iou(found: Tensor, inside: Tensor) -> Float[Tensor, " b"]:
-    """Share of queries in both among those in either. Half of the queries are inside: it is not that of volumes."""
-    return (found & inside).sum(1) / (found | inside).sum(1)
 
 
 def use(said: SoftStump) -> dict[str, Float[Tensor, " b"]]:

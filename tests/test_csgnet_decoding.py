@@ -249,5 +249,5 @@ def test_nothing_to_write_is_an_error(wrong):
 
 @pytest.mark.usefixtures("unchecked_shapes")
 def test_a_network_of_the_plane_writes_for_no_grid():
-    with pytest.raises(ValueError, match="expected bool"):
+    with pytest.raises(ValueError, match="expected a bool tensor"):
         write(random_network(41), random_canvases(42, 1, 3))

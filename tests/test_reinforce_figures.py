@@ -88,7 +88,7 @@ def test_curves_show_their_numbers():
     tuning_figure([0.1], {0: {"val_cd": 7.0}}).canvas.draw()  # a single step
     rows = [{"epoch": k, "val_reward": 0.1 * k, "val_cd": 5.0 - k} for k in (1, 2)]
     left, right = long_runs_figure([{"name": "supervised start", "log": rows}]).axes
-    assert right.lines[0].get_ydata().tolist() == [4.0, 3.0] and left.get_legend() is not None
+    assert right.lines[0].get_ydata().tolist() == [4.0, 3.0] and right.get_legend() is not None
     assert not plt.get_fignums()
 
 

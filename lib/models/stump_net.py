@@ -29,7 +29,7 @@ from .soft_stump import SoftStump
 from .superquadrics import Superquadric
 
 SOLID = ("box", "cylinder", "sphere", "cone")
-MADE_OF = KINDS | {"superquadric": Superquadric}
+MADE_OF = {name: KINDS[name] for name in SOLID} | {"superquadric": Superquadric}
 ENDLESS = ("cylinder", "cone")
 HEADS = ("low_rank", "linear", "own")
 CODE_SLOPE = 0.01  # of the decoder's leaky ReLU
@@ -67,10 +67,8 @@ class StumpNetConfig:
     def __post_init__(self) -> None:
         if self.head not in HEADS:
             raise ValueError(f"found the head {self.head!r}; expected one of {', '.join(HEADS)}")
-        if not self.kinds or not set(self.kinds) <= {*SOLID, "superquadric"}:
-            raise ValueError(
-                f"found the kinds {self.kinds}; expected some of {', '.join(SOLID)}, superquadric"
-            )
+        if not self.kinds or not set(self.kinds) <= MADE_OF.keys():
+            raise ValueError(f"found the kinds {self.kinds}; expected some of {', '.join(MADE_OF)}")
         if min(self.primitives, self.nodes, self.rank, self.feature, *self.widths) < 1:
             raise ValueError(f"found {self}; expected sizes of at least 1")
         if self.primitives % len(self.kinds) or self.head == "own" and self.nodes != self.primitives:
@@ -181,6 +179,7 @@ def _connections(config: StumpNetConfig) -> nn.Module | None:
 
 
 def decoder(*widths: int) -> nn.Sequential:
+    """Linear layers and leaky ReLUs from each width to the next, as the authors begin them."""
     layers = []
     for wide, next_wide in zip(widths, widths[1:]):
         layers += [nn.Linear(wide, next_wide), nn.LeakyReLU(CODE_SLOPE)]

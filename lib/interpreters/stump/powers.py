@@ -5,7 +5,7 @@
 What softmax weights do by exp, P^p does here: large products count, small ones do not, and the weights are held
 constant in the gradient. But (W G)^p = W^p G^p, so both sums are products of two matrices, and so are their gradients.
 It is never above the maximum, and equal to it where all other products are 0. Where all are so small that their powers
-leave the range of float32 (below 1e-4 for p = 8), it is 0.
+leave the range of float32 (below 2e-4 for p = 8), it falls to 0.
 """
 
 import torch

@@ -22,7 +22,7 @@ from lib.training.stump_net import Lesson, StumpStudent, pulled, use
 from lib.training.ucsg import UCSGLesson, UCSGStudent
 from tests.conftest import unchecked
 
-TINY = StumpNetConfig(8, 4, rank=3, feature=8, widths=(8, 8), neighbours=3, norm="layer")
+TINY = StumpNetConfig(8, 4, rank=3, feature=8, widths=(8, 8), neighbours=3)
 LESSON = Lesson(points=12, queries=16)
 
 
@@ -65,7 +65,7 @@ def test_the_second_term_by_hand():
 
 
 def test_the_loss_is_both_terms():
-    task = task_of(lesson=Lesson(points=20, queries=40, weight=0.5))
+    task = task_of(lesson=Lesson(points=20, queries=40, weight=0.5, dullest=150))
     loss, terms = task.loss(task.network, [2, 0], torch.Generator().manual_seed(0), 0.0)
     clouds = task.train.points[[2, 0]].float()
     said = task.student.network(clouds)
@@ -201,7 +201,7 @@ def test_rivals_are_commands_too(tmp_path):
 def test_the_papers_settings(tmp_path):
     assert train("--paper", *FEW, "--category", "table", "--out", tmp_path) == 0
     settings = json.loads((tmp_path / "stump_net.json").read_text())["settings"]
-    assert settings["rate"] == 1e-4 and settings["last"] == 1 and settings["network"]["norm"] == "batch"
+    assert settings["rate"] == 1e-4 and settings["last"] == 1 and settings["network"]["neighbours"] == 20
     assert settings["lesson"] | {"temperature": 20, "power": None, "steepest": 1} == settings["lesson"]
 
 

@@ -4,7 +4,8 @@
     encoder     three EdgeConvs, each with the neighbours in the features before it; their outputs side by side ->
                 a linear layer -> maximum over all points
 
-A layer is linear without a bias, a norm, leaky ReLU. The first of an EdgeConv is linear in x_j and in x_i, so it is
+A layer is linear without a bias, a batch norm, leaky ReLU. (A norm of each point's own numbers in its place would
+forget how far a point is from the origin, and from its neighbours.) The first of an EdgeConv is linear in x_j and in x_i, so it is
 computed once a point and then gathered, not once an edge: W [x_j - x_i, x_i] = A x_j + (B - A) x_i with W = [A, B].
 """
 
@@ -13,7 +14,6 @@ from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 SLOPE = 0.2  # of the leaky ReLU
-NORMS = {"batch": nn.BatchNorm1d, "layer": nn.LayerNorm}
 
 
 class DGCNN(nn.Module):
@@ -21,21 +21,18 @@ class DGCNN(nn.Module):
 
     width       of the feature
     neighbours  that a point looks at, itself among them; in smaller clouds all points
-    norm        "batch", the paper's, or "layer", which scales each point by its own mean and spread, so that a cloud's
-                feature does not depend on the others of its batch
-    Raises ValueError for another norm, and for sizes below 1.
+    Raises ValueError for sizes below 1.
     """
 
-    def __init__(self, width: int = 256, neighbours: int = 20, norm: str = "batch"):
+    def __init__(self, width: int = 256, neighbours: int = 20):
         super().__init__()
-        if norm not in NORMS or min(width, neighbours) < 1:
-            found = f"found the norm {norm!r}, width {width}, {neighbours} neighbours"
-            raise ValueError(f"{found}; expected one of {', '.join(NORMS)}, and sizes of at least 1")
+        if min(width, neighbours) < 1:
+            raise ValueError(f"found width {width}, {neighbours} neighbours; expected at least 1 of each")
         self.neighbours = neighbours
         layers = ((3, (64, 64)), (64, (64, 64)), (64, (64,)))
-        self.convolutions = nn.ModuleList(EdgeConv(inner, widths, norm) for inner, widths in layers)
+        self.convolutions = nn.ModuleList(EdgeConv(inner, widths) for inner, widths in layers)
         self.last = nn.Linear(3 * 64, width, bias=False)
-        self.norm = NORMS[norm](width)
+        self.norm = nn.BatchNorm1d(width)
 
     def forward(self, points: Float[Tensor, "b n 3"]) -> Float[Tensor, "b width"]:
         """The same for any order of the points."""
@@ -50,10 +47,10 @@ class DGCNN(nn.Module):
 class EdgeConv(nn.Module):
     """Features of points (b, n, inner) to new ones (b, n, widths[-1]), from the points near each."""
 
-    def __init__(self, inner: int, widths: tuple[int, ...], norm: str):
+    def __init__(self, inner: int, widths: tuple[int, ...]):
         super().__init__()
         self.first = nn.Linear(2 * inner, widths[0], bias=False)
-        self.norms = nn.ModuleList(NORMS[norm](width) for width in widths)
+        self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in widths)
         self.others = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in zip(widths, widths[1:]))
 
     def forward(

@@ -12,9 +12,10 @@ the code weigh the products of their numbers:
     logit_kc = sum_d p_kd g_d(code) n_cd
 
 Outputs are scaled to shapes of diagonal 1 around the origin, and a new network begins with something sensible: small
-primitives all over the place, node c that selects primitive c and no other, and a union of the nodes whose primitives
-have an end. With the head "own" it stays so, node c is primitive c: boxes alone are then a rival, volumetric primitives
-(Tulsiani et al. 2017), and superquadrics another (Paschalidou et al. 2019).
+primitives all over the place, node c that selects primitive c, and a union of all nodes. Where primitive c has no end,
+the node selects one of those that have, too: a cylinder is cut by a box. With the head "own" node c is primitive c for
+ever: boxes alone are then a rival, volumetric primitives (Tulsiani et al. 2017), and superquadrics another (Paschalidou
+et al. 2019).
 """
 
 from dataclasses import dataclass
@@ -47,7 +48,7 @@ class StumpNetConfig:
     kinds       of primitives; there are as many of each, in this order
     head        "low_rank", "linear" or "own", see above; rank: numbers of an embedding
     feature, widths     of the encoder's output, and of the decoder's layers, the code last
-    neighbours, norm    of the encoder, see DGCNN
+    neighbours  of a point, for the encoder, see DGCNN
     complement  False: no primitive is complemented, as in the authors' program
     Raises ValueError for other heads and kinds, sizes below 1, K that the kinds do not divide, and for the head "own"
     with another C than K.
@@ -61,7 +62,6 @@ class StumpNetConfig:
     feature: int = 256
     widths: tuple[int, ...] = (512, 1024, 2048)
     neighbours: int = 20
-    norm: str = "batch"
     complement: bool = True
 
     def __post_init__(self) -> None:
@@ -80,7 +80,7 @@ class StumpNetConfig:
     @staticmethod
     def compact(primitives: int = 64, nodes: int = 64, **others) -> "StumpNetConfig":
         """A network that two cores can train; `others` are fields by name."""
-        small = {"rank": 128, "widths": (256, 512), "neighbours": 12, "norm": "layer"}
+        small = {"rank": 128, "widths": (256, 512), "neighbours": 8}
         return StumpNetConfig(primitives, nodes, **small | others)
 
 
@@ -90,22 +90,15 @@ class StumpNet(nn.Module):
     def __init__(self, config: StumpNetConfig):
         super().__init__()
         self.config = config
-        self.encoder = DGCNN(config.feature, config.neighbours, config.norm)
+        self.encoder = DGCNN(config.feature, config.neighbours)
         self.decoder = decoder(config.feature, *config.widths)
         code = config.widths[-1]
         each = config.primitives // len(config.kinds)
         self.primitives = nn.ModuleList(PrimitiveHead(MADE_OF[kind], code, each) for kind in config.kinds)
         self.to_complement = _quiet(code, config.primitives, OFF) if config.complement else None
         self.to_intersection = _connections(config)
-        self.to_union = _quiet(code, config.nodes)
-        own = torch.arange(config.nodes) % config.primitives  # the primitive that each node selects at first
-        has_end = torch.tensor([kind not in ENDLESS for kind in config.kinds]).repeat_interleave(each)
-        with torch.no_grad():
-            self.to_union.bias.copy_(torch.where(has_end[own], ON, OFF))
-        on, off = (torch.inf, -torch.inf) if config.head == "own" else (ON, OFF)
-        first = torch.full((config.primitives, config.nodes), off)
-        first[own, torch.arange(config.nodes)] = on
-        self.register_buffer("first", first, persistent=False)
+        self.to_union = _quiet(code, config.nodes, ON)
+        self.register_buffer("first", first_selection(config), persistent=False)
 
     def forward(self, points: Float[Tensor, "b n 3"]) -> SoftStump:
         """What the network says of each cloud."""
@@ -167,6 +160,21 @@ class LowRank(nn.Module):
 
     def forward(self, code: Float[Tensor, "b code"]) -> Float[Tensor, "b K C"]:
         return (self.of_primitives * self.weights(code).unsqueeze(1)) @ self.of_nodes.T
+
+
+def first_selection(config: StumpNetConfig) -> Float[Tensor, "K C"]:
+    """Logits of W_I that a new network begins with, see above; with the head "own" it keeps them."""
+    nodes = torch.arange(config.nodes)
+    own, each = nodes % config.primitives, config.primitives // len(config.kinds)
+    kind, place = own // each, own % each
+    on, off = (torch.inf, -torch.inf) if config.head == "own" else (ON, OFF)
+    first = torch.full((config.primitives, config.nodes), off)
+    first[own, nodes] = on
+    bounded = [k for k, name in enumerate(config.kinds) if name not in ENDLESS]
+    if config.head != "own" and bounded:
+        endless = torch.tensor([name in ENDLESS for name in config.kinds])[kind]
+        first[torch.where(endless, bounded[0] * each + place, own), nodes] = on
+    return first
 
 
 def _connections(config: StumpNetConfig) -> nn.Module | None:

@@ -36,8 +36,7 @@ class UCSGConfig:
     nodes: int = 12
     feature: int = 256
     widths: tuple[int, ...] = (256, 512)
-    neighbours: int = 12
-    norm: str = "layer"
+    neighbours: int = 8
 
     def __post_init__(self) -> None:
         if min(self.each, self.layers, self.nodes, self.feature, *self.widths) < 1:
@@ -122,7 +121,7 @@ class UCSG(nn.Module):
         super().__init__()
         self.config = config
         code = config.widths[-1]
-        self.encoder = DGCNN(config.feature, config.neighbours, config.norm)
+        self.encoder = DGCNN(config.feature, config.neighbours)
         self.decoder = decoder(config.feature, *config.widths)
         self.primitives = nn.ModuleList(PrimitiveHead(kind, code, config.each) for kind in (Box, Sphere))
         inputs = [2 * config.each] + [2 * config.each + 4 * config.nodes] * (config.layers - 1)

@@ -20,8 +20,8 @@ LOOP = (
     Setting("warmup", float, 0.02, 0.0, "share of the steps in which the rate grows from 0"),
     Setting("last", float, 0.02, 1.0, "the rate at the end, as a share of the highest"),
     Setting("clip", float, 1.0, 1e9, "largest norm of the gradient"),
-    Setting("points", int, 512, 2048, "of a cloud that are looked at in a step"),
-    Setting("queries", int, 1024, 2048, "points of space that are asked about in a step"),
+    Setting("points", int, 256, 2048, "of a cloud that are looked at in a step"),
+    Setting("queries", int, 512, 2048, "points of space that are asked about in a step"),
 )
 VALIDATED = 200  # clouds that are scored after every epoch
 

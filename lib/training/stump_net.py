@@ -37,12 +37,12 @@ class Lesson:
     Raises ValueError for another pull, and for numbers that make no sense.
     """
 
-    points: int = 512
-    queries: int = 1024
+    points: int = 256
+    queries: int = 512
     pull: str = "paper"
     weight: float = 1e-3
     steepest: float = 8.0
-    dullest: float = SHARPNESS
+    dullest: float = 10.0
     power: float | None = 8.0
     temperature: float | None = None
 

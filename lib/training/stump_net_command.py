@@ -17,7 +17,7 @@ SETTINGS = (
     Setting("nodes", int, 64, 256, "C"),
     Setting("weight", float, 1e-3, 1e-3, "of the term that pulls primitives to points"),
     Setting("steepest", float, 8.0, 1.0, "of the connections' sigmoid at the end"),
-    Setting("dullest", float, 150.0, 150.0, "of the surfaces' sigmoid at the beginning"),
+    Setting("dullest", float, 10.0, 150.0, "of the surfaces' sigmoid at the beginning"),
     Setting("power", float, 8.0, 0.0, "of the soft layers' means; 0: softmax of --temperature"),
     Setting("temperature", float, 20.0, 20.0, "of the soft layers, if the power is 0"),
 )

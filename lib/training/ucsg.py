@@ -21,8 +21,8 @@ NARROW = 0.05  # margin below which choices are driven to be certain
 class UCSGLesson:
     """points, queries: of each cloud that are seen in a step, and asked about. Raises ValueError for too few."""
 
-    points: int = 512
-    queries: int = 1024
+    points: int = 256
+    queries: int = 512
 
     def __post_init__(self) -> None:
         if self.points < 1 or self.queries < 2:

@@ -30,7 +30,7 @@ from tqdm import tqdm
 
 from data_scripts.ending import exit_code
 from data_scripts.journal import write_whole
-from data_scripts.measuring import INTERRUPTED, check_writable, version
+from data_scripts.measuring import INTERRUPTED, check_writable, rounded, version
 from lib.datasets import REPOSITORY, DataError, csg_programs, silhouettes
 from lib.datasets.csg import TokenSet
 from lib.datasets.images import logos
@@ -222,13 +222,6 @@ def network_of(path: Path, dimensions: int) -> CSGNet:
     except ValueError as error:
         raise DataError(f"{path}: {error}") from error
     return network
-
-
-def rounded(found):
-    """Numbers with four digits after the point, also inside of rows."""
-    if isinstance(found, dict):
-        return {name: rounded(value) for name, value in found.items()}
-    return round(found, 4) if isinstance(found, float) else found
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -73,3 +73,10 @@ def version(*parts: str) -> dict[str, str]:
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, cwd=REPOSITORY
     )
     return {"date": date.today().isoformat(), "commit": asked.stdout.strip(), "code": code_digest(*parts)}
+
+
+def rounded(found):
+    """Numbers with four digits after the point, also inside of rows."""
+    if isinstance(found, dict):
+        return {name: rounded(value) for name, value in found.items()}
+    return round(found, 4) if isinstance(found, float) else found

@@ -50,6 +50,11 @@ class SoftStump:
         """The same with all decided."""
         return layers.binary(distances <= 0, *(logits > 0 for logits in self.logits))[1]
 
+    def signed(self, distances: Float[Tensor, "b k m"]) -> Float[Tensor, "b m"]:
+        """Decided, too: negative inside, 0 on the surface; see `layers.signed`."""
+        matrices = [logits > 0 for logits in self.logits]
+        return torch.stack([layers.signed(*each) for each in zip(distances, *matrices)])
+
     @property
     def logits(self) -> tuple[Tensor, Tensor, Tensor]:
         """Complement (b, K), intersection (b, K, C), union (b, C)."""

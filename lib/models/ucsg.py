@@ -77,16 +77,19 @@ class SoftTree:
 
     def inside(self, distances: Float[Tensor, "b k m"]) -> Bool[Tensor, "b m"]:
         """The same with all decided."""
-        inside = distances <= 0
-        found = inside
-        for k, logits in enumerate(self.choices):
+        return self.signed(distances) <= 0
+
+    def signed(self, distances: Float[Tensor, "b k m"]) -> Float[Tensor, "b m"]:
+        """Decided, too: negative inside, 0 on the surface; the smaller of two for "or", the larger for "and"."""
+        found = distances
+        for logits in self.choices:
             chosen = logits.argmax(2)  # (b, 2, nodes)
             rows = chosen.unsqueeze(-1).expand(-1, -1, -1, found.shape[2])
             left, right = (found.gather(1, rows[:, side]) for side in (0, 1))
-            if k == len(self.choices) - 1:
-                return (left | right)[:, 0]
-            found = torch.cat([left | right, left & right, left & ~right, right & ~left, inside], 1)
-        raise AssertionError("there is at least one layer")
+            either = torch.minimum(left, right)
+            others = torch.maximum(left, right), torch.maximum(left, -right), torch.maximum(right, -left)
+            found = torch.cat([either, *others, distances], 1)
+        return found[:, 0]  # the last layer has one node
 
     def used(self) -> Bool[Tensor, "b k"]:
         """Which primitives the decided tree chooses, directly or through layers in between."""

@@ -27,6 +27,9 @@ class Said(Protocol):
     def inside(self, distances: Float[Tensor, "b k m"]) -> Bool[Tensor, "b m"]:
         """Which points are in the solid, all connections decided."""
 
+    def signed(self, distances: Float[Tensor, "b k m"]) -> Float[Tensor, "b m"]:
+        """The same as a field: negative inside, 0 on the surface."""
+
 
 class Student(nn.Module):
     """A network and how it is taught, as one module. points, queries: of each cloud that are seen, and asked about."""

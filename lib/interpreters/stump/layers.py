@@ -6,8 +6,10 @@
 values from 0 to 1. Its min and max are exact; or, with a temperature, averages that lean to the smallest and the
 largest value, weights softmax(-temperature value) and softmax(temperature value), held constant in the gradient, as in
 the paper's program (there 20); or, with a power, averages that lean so by powers, which is much faster: see `powers`.
+`signed` is the language again, of distances: its result is negative inside, and 0 where the surface is.
 """
 
+import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
@@ -26,6 +28,25 @@ def binary(
     lacking = (inside == w_c.unsqueeze(-1)).float()  # 1 - F
     nodes = w_i.mT.float() @ lacking == 0
     return nodes, (nodes & w_u.unsqueeze(-1)).any(-2)
+
+
+def signed(
+    distances: Float[Tensor, "k m"],
+    w_c: Bool[Tensor, " k"],
+    w_i: Bool[Tensor, "k c"],
+    w_u: Bool[Tensor, " c"],
+) -> Float[Tensor, " m"]:
+    """The largest of a node's distances (a complement's has the other sign), and the smallest of the united nodes'.
+
+    Nowhere farther from 0 than the surface is away, if the distances are. An intersection of nothing is -inf; a union
+    of nothing inf.
+    """
+    turned = torch.where(w_c.unsqueeze(1), -distances, distances)
+    smallest = torch.full_like(distances[0], torch.inf)
+    for rows in w_i[:, w_u].T:
+        node = turned[rows].amax(0) if rows.any() else torch.full_like(smallest, -torch.inf)
+        smallest = torch.minimum(smallest, node)
+    return smallest
 
 
 def soft(

@@ -1,8 +1,7 @@
 """Marching cubes on a stump's signed field: fast, of any stump, with the grid's precision.
 
-The field is the largest of a node's distances (a complement's has the other sign), and the smallest of the united
-nodes': negative inside, and nowhere farther from 0 than the surface is away. An intersection of nothing is -inf; a
-union of nothing as large as the window. The surface also closes where the window cuts the shape.
+The field is `layers.signed`: negative inside, and nowhere farther from 0 than the surface is away. The surface also
+closes where the window cuts the shape.
 
 Where the field is known to keep its sign it is not computed: a small block of samples whose middle is farther from the
 surface than all of them, and than their neighbours, has the middle's value throughout.
@@ -20,6 +19,7 @@ from torch import Tensor
 
 from ..threads import one_thread
 from . import distances as formulas
+from . import layers
 from .cutting import side
 from .primitives import Batches, Cone, Primitive
 from .program import Stump
@@ -78,18 +78,13 @@ class _Field:
         self.device = stump.primitives[0].translation.device
         middle, unit = window.mean(0).to(self.device), side(window) or 1.0
         self.batches = Batches([_seen_from(middle, unit, primitive) for primitive in stump.primitives])
-        self.sign = 1 - 2 * stump.complement.to(self.device).float().unsqueeze(1)
-        columns = stump.intersection[:, stump.union].T.to(self.device)
-        self.nodes = [column.nonzero()[:, 0] for column in columns]
+        self.matrices = [matrix.to(self.device) for matrix in stump.matrices]
         self.half = ((window[1] - window[0]) / (2 * unit)).to(self.device, torch.float32)
         self.step = step(len(stump.primitives), self.device)
 
     def __call__(self, points: Float[Tensor, "m 3"]) -> Float[Tensor, " m"]:
-        distances = self.batches.distances(points).mul_(self.sign)
-        nearest = distances.new_full((len(points),), 2 * float(self.half.max()))
-        for rows in self.nodes:
-            node = distances[rows].amax(0) if len(rows) else torch.full_like(nearest, -torch.inf)
-            torch.minimum(nearest, node, out=nearest)
+        nearest = layers.signed(self.batches.distances(points), *self.matrices)
+        nearest = nearest.clamp(max=2 * float(self.half.max()))  # finite, where nothing is united
         return torch.maximum(nearest, formulas.box(points, self.half))
 
 

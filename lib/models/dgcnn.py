@@ -5,8 +5,8 @@
                 a linear layer -> maximum over all points
 
 A layer is linear without a bias, a batch norm, leaky ReLU. (A norm of each point's own numbers in its place would
-forget how far a point is from the origin, and from its neighbours.) The first of an EdgeConv is linear in x_j and in x_i, so
-it is computed once a point and then gathered, not once an edge: W [x_j - x_i, x_i] = A x_j + (B - A) x_i, where
+forget how far a point is from the origin, and from its neighbours.) The first of an EdgeConv is linear in x_j and in
+x_i, so it is computed once a point and then gathered, not once an edge: W [x_j - x_i, x_i] = A x_j + (B - A) x_i, where
 W = [A, B].
 """
 

@@ -19,7 +19,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
 
@@ -42,9 +42,11 @@ from lib.models.reconstructing import surface
 from lib.models.stump_net import StumpNet
 from lib.models.ucsg import UCSG, SoftTree
 from lib.models.weights import CheckpointError, load
+from lib.training.csgnet_command import spread
 
 FOLDER = REPOSITORY / "results" / "stump_net"
 NAMES = ("stump_net_64", "stump_net_32", "volumetric_primitives", "superquadrics", "ucsg")
+OWN = ("bounding_box", "search")  # rows without a network
 POINTS = 2048  # on each surface
 SEEN = 256  # points of a cloud that a network looks at, as in its training
 SECONDS = 5.0  # that the search may think about the matrices of a cloud
@@ -77,8 +79,8 @@ def of_box(clouds: SolidSet, number: int) -> Answer:
 
 def of_search(clouds: SolidSet, number: int) -> Answer:
     """What the search finds; nothing where it gives up."""
-    cloud = PointCloud(clouds.points[number].double().numpy(), clouds.normals[number].double().numpy())
     try:
+        cloud = PointCloud(clouds.points[number].double().numpy(), clouds.normals[number].double().numpy())
         stump = find_stump(cloud, seconds=SECONDS).stump.to(torch.float32)
     except (CloudError, SearchError):
         return lambda points: torch.ones(len(points)), {"primitives": 0.0, "nodes": 0.0}
@@ -137,18 +139,21 @@ def mean(values: list[float]) -> float:
 
 
 def network_of(path: Path) -> nn.Module:
-    """A CSG-Stump Net or a UCSG-Net, whichever is there. Raises CheckpointError for neither."""
-    try:
-        return load(StumpNet, path)
-    except CheckpointError:
-        return load(UCSG, path)
+    """A CSG-Stump Net or a UCSG-Net, whichever is there. Raises CheckpointError, which says why, for neither."""
+    told = []
+    for kind in (StumpNet, UCSG):
+        try:
+            return load(kind, path)
+        except CheckpointError as error:
+            told.append(str(error))
+    raise CheckpointError("; ".join(dict.fromkeys(told)))
 
 
 def some(clouds: SolidSet, count: int) -> SolidSet:
-    """That many of them, evenly. Raises DataError where there are none."""
+    """At most that many of them, evenly. Raises DataError where there are none."""
     if not len(clouds):
         raise DataError(f"{clouds.describe()} There is nothing to measure; expected 1 or more")
-    return clouds.rows(range(0, len(clouds), -(-len(clouds) // count)))
+    return clouds.rows(spread(len(clouds), count).tolist())
 
 
 def measure(paths: dict[str, Path], source: str | None, count: int, searched: int) -> dict:
@@ -199,7 +204,7 @@ def main(arguments: list[str] | None = None) -> int:
             )
         torch.set_num_threads(1)
         try:
-            paths = {Path(name).stem: weights_of(name) for name in options.names}
+            paths = paths_of(options.names)
             found = rounded(measure(paths, options.source, options.count, options.searched))
         except CheckpointError as error:
             raise DataError(str(error)) from error
@@ -208,6 +213,14 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"kept in {options.out}")
 
     return exit_code(work, INTERRUPTED)
+
+
+def paths_of(names: Sequence[str]) -> dict[str, Path]:
+    """The weights of each row. Raises DataError for names of which two would be one row."""
+    rows = [Path(name).stem for name in names]
+    if taken := sorted({row for row in rows if [*rows, *OWN].count(row) > 1}):
+        raise DataError(f"found several rows called {taken[0]!r}; expected files of different names")
+    return {row: weights_of(name) for row, name in zip(rows, names)}
 
 
 def weights_of(name: str) -> Path:

@@ -11,6 +11,7 @@ from tests import (
     test_exercises_measuring,
     test_exercises_reinforce,
     test_exercises_stump,
+    test_exercises_stump_net,
     test_exercises_training,
     test_exercises_writing,
 )
@@ -18,7 +19,7 @@ from tests.verdicts import hints
 
 FILES = (
     test_exercises_csgnet, test_exercises_measuring, test_exercises_reinforce, test_exercises_stump,
-    test_exercises_training, test_exercises_writing,
+    test_exercises_stump_net, test_exercises_training, test_exercises_writing,
 )  # fmt: skip
 CHECKS = [check for file in FILES for check in file.CHECKS]
 GARBAGE = [

@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 
 from lib.interpreters.cuboids import Cuboids
 from lib.interpreters.shapeassembly import execute_many, parse
-from lib.metrics.points import chamfer_distance
+from lib.metrics.points import chamfer_distance, squared_chamfer_distance
 from lib.metrics.programs import PAPER_GROUND_TRUTH, program_statistics
 from lib.metrics.rootedness import box_distance, connected_to_ground, is_rooted
 
@@ -82,6 +82,43 @@ def test_chamfer_distance_pulls_points_together():
     a = torch.tensor([[0.0, 0, 0]], requires_grad=True)
     chamfer_distance(a, torch.tensor([[0.0, 3, 0]])).backward()
     assert a.grad.tolist() == [[0, -2, 0]]
+
+
+def test_squared_chamfer_distance_by_hand():
+    a = torch.tensor([[0.0, 0, 0], [1, 0, 0]])
+    b = torch.tensor([[0.0, 0, 2]])
+    assert squared_chamfer_distance(a, b) == pytest.approx(((4 + 5) / 2 + 4) / 2)  # the mean of both ways
+    assert squared_chamfer_distance(a, a) == 0
+    assert squared_chamfer_distance(a, b) == squared_chamfer_distance(b, a)
+    assert squared_chamfer_distance(3 * a, 3 * b) == pytest.approx(9 * ((4 + 5) / 2 + 4) / 2)
+    for pair in ((a, a[:0]), (a[:0], a)):
+        with pytest.raises(ValueError, match="both clouds need points, got [02] and [02]"):
+            squared_chamfer_distance(*pair)
+
+
+def test_squared_chamfer_distances_of_a_batch_are_those_of_its_pairs():
+    """And those of every pair of points, squared, without a search."""
+    generator = torch.Generator().manual_seed(0)
+    a, b = (torch.rand(2, 3, n, 3, generator=generator, dtype=torch.float64) for n in (40, 50))
+    found = squared_chamfer_distance(a, b)
+    assert found.shape == (2, 3)
+    squares = (a.unsqueeze(3) - b.unsqueeze(2)).square().sum(-1)
+    torch.testing.assert_close(found, (squares.amin(3).mean(2) + squares.amin(2).mean(2)) / 2)
+    for i in range(2):
+        for j in range(3):
+            torch.testing.assert_close(found[i, j], squared_chamfer_distance(a[i, j], b[i, j]))
+
+
+def test_squared_chamfer_distance_has_the_gradient_of_its_formula():
+    a = torch.tensor([[0.0, 0, 0]], requires_grad=True)
+    squared_chamfer_distance(a, torch.tensor([[0.0, 3, 0]])).backward()
+    assert a.grad.tolist() == [[0, -6, 0]]
+    generator = torch.Generator().manual_seed(0)
+    pair = [torch.rand(n, 3, generator=generator, dtype=torch.float64).requires_grad_() for n in (5, 7)]
+    assert torch.autograd.gradcheck(squared_chamfer_distance, pair)
+    same = torch.zeros(2, 3, requires_grad=True)
+    squared_chamfer_distance(same, same.detach()).backward()
+    assert not same.grad.any()  # finite where points coincide
 
 
 @pytest.mark.parametrize(

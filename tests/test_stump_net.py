@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from lib.interpreters.stump import Box, Cone, Cylinder, Sphere, execute, execute_many
+from lib.interpreters.stump import Box, Cone, Cylinder, Sphere, execute, execute_many, layers
 from lib.models.program_vae import ProgramVAE
 from lib.models.soft_stump import SoftStump
 from lib.models.stump_net import LowRank, StumpNet, StumpNetConfig
@@ -109,6 +109,17 @@ def test_decided_stumps_are_what_the_network_decides(network):
     assert not any(stump.parameters().requires_grad for stump in stumps)
     if network.to_complement is None:
         assert not any(stump.complement.any() for stump in stumps)
+
+
+def test_signed_distances_are_those_of_the_decided_stumps(network):
+    """Negative where `inside` says yes; unused primitives and nodes have no say."""
+    said, points = network(clouds()), clouds(1, 2000)[0]
+    distances = said.distances(points.expand(3, -1, -1))
+    signed = said.signed(distances)
+    assert signed.shape == (3, 2000) and torch.equal(signed <= 0, said.inside(distances))
+    assert 5 < (signed <= 0).sum() < 0.9 * signed.numel()
+    for stump, row in zip(said.stumps(), signed):
+        torch.testing.assert_close(layers.signed(stump.distances(points), *stump.matrices), row.detach())
 
 
 def test_the_steeper_the_nearer_to_the_decided(network):

@@ -1,11 +1,15 @@
 """The product of the layers, block by block, against the one big tensor of the textbook."""
 
+import math
+
+import numpy as np
 import pytest
 import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 
 from lib.interpreters.stump import layers, products
 from lib.interpreters.stump.products import STEEPEST, max_product
+from tests.random_stumps import random_stump
 
 TEMPERATURES = [None, 1.0, 20.0, STEEPEST]
 
@@ -141,3 +145,62 @@ def test_yes_and_no_are_the_formulas_with_zeros_and_ones():
             torch.equal(found, expected > 0.5)
             for found, expected in zip(layers.binary(inside, w_c, w_i, w_u), (nodes, values))
         )
+
+
+def matrices_of(rng: np.random.Generator, k: int, c: int) -> list[torch.Tensor]:
+    """Complement, intersection, union: some nodes select nothing, sometimes nothing is united."""
+    return [torch.tensor(rng.random(shape) < share) for shape, share in ((k, 0.4), ((k, c), 0.4), (c, 0.6))]
+
+
+def by_hand(distances, w_c, w_i, w_u):
+    """Signed distances as min and max of lists of numbers."""
+    return [
+        min(
+            (
+                max((-d if w_c[k] else d for k, d in enumerate(column) if w_i[k, c]), default=-math.inf)
+                for c in range(len(w_u))
+                if w_u[c]
+            ),
+            default=math.inf,
+        )
+        for column in distances.T.tolist()
+    ]
+
+
+def test_signed_distances_are_the_smallest_of_the_largest():
+    """The same numbers, not rounded; and their signs are what `binary` says."""
+    rng, found_inside = np.random.default_rng(0), []
+    for _ in range(60):
+        k, c, m = rng.integers([1, 0, 1], [7, 6, 20])
+        distances, matrices = torch.tensor(rng.normal(size=(k, m))), matrices_of(rng, k, c)
+        found = layers.signed(distances, *matrices)
+        assert found.tolist() == by_hand(distances, *matrices)
+        assert torch.equal(found <= 0, layers.binary(distances <= 0, *matrices)[1])
+        found_inside += (found <= 0).tolist()
+    assert 0.2 < np.mean(found_inside) < 0.8
+
+
+def test_an_intersection_of_nothing_is_everywhere_and_a_union_of_nothing_nowhere():
+    distances, none = torch.tensor([[1.0, -2.0], [3.0, 4.0]]), torch.zeros(2, dtype=torch.bool)
+    nodes = torch.tensor([[True, False], [True, False]])  # the second selects nothing
+    first, second, both, neither = torch.tensor([[1, 0], [0, 1], [1, 1], [0, 0]]).bool()
+    assert layers.signed(distances, none, nodes, first).tolist() == [3, 4]
+    assert layers.signed(distances, ~none, nodes, first).tolist() == [-1, 2]
+    assert layers.signed(distances, none, nodes, second).tolist() == [-torch.inf] * 2
+    assert layers.signed(distances, none, nodes, both).tolist() == [-torch.inf] * 2
+    assert layers.signed(distances, none, nodes, neither).tolist() == [torch.inf] * 2
+    assert layers.signed(distances, none, nodes[:, :0], none[:0]).tolist() == [torch.inf] * 2
+
+
+def test_no_signed_distance_is_farther_from_zero_than_the_surface_is_away():
+    """Then two of them differ by no more than the way between their points."""
+    rng, solids = np.random.default_rng(1), 0
+    for _ in range(40):
+        stump = random_stump(rng, 3, forms=("box", "sphere", "cylinder", "capped cylinder", "capped cone"))
+        places = torch.tensor(rng.uniform(-0.7, 0.7, (60, 3)))
+        found = layers.signed(stump.distances(places), *stump.matrices)
+        apart = (found.unsqueeze(0) - found.unsqueeze(1)).abs()
+        if stump.union.any():
+            assert (apart <= torch.cdist(places, places) + 1e-9).all()  # rounding
+            solids += 1
+    assert solids > 20

@@ -90,6 +90,38 @@ def test_layers_choose_and_combine():
     torch.testing.assert_close(soft[far], expected[far].float(), atol=1e-4, rtol=0)
 
 
+def test_signed_distances_are_min_and_max_along_the_tree():
+    said, places = hand_made(), points(2000).float()
+    distances = said.distances(places[None])
+    a, b, c = distances[0]
+    expected = torch.minimum(torch.maximum(a, -b), torch.maximum(b, c))
+    assert torch.equal(said.signed(distances), expected[None])
+
+
+def decided(said: SoftTree, inside: torch.Tensor, row: int) -> torch.Tensor:
+    """The tree of one cloud with yes and no: what each layer's nodes make of what they choose, one by one."""
+    found = list(inside)
+    for logits in said.choices:
+        numbers = logits[row].argmax(1).T.tolist()
+        pairs = [(found[left], found[right]) for left, right in numbers]
+        ways = (lambda p, q: p | q, lambda p, q: p & q, lambda p, q: p & ~q, lambda p, q: q & ~p)
+        found = [way(p, q) for way in ways for p, q in pairs] + list(inside)
+    return found[0]
+
+
+def test_signs_are_what_the_decided_tree_says_with_yes_and_no():
+    found = []
+    for seed in range(20):
+        torch.manual_seed(seed)
+        said = UCSG(TINY).eval()(points(60).float().view(2, 30, 3))
+        distances = said.distances(points(1000).float().expand(2, -1, -1)).detach() - 0.1  # larger ones
+        signed = said.signed(distances)
+        expected = torch.stack([decided(said, distances[row] <= 0, row) for row in range(2)])
+        assert torch.equal(signed <= 0, expected) and torch.equal(said.inside(distances), expected)
+        found.append(expected.float().mean().item())
+    assert sum(0.05 < share < 0.95 for share in found) > 10
+
+
 @pytest.fixture
 def network() -> UCSG:
     torch.manual_seed(0)

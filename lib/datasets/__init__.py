@@ -6,6 +6,8 @@
     random = csg_programs(2, split="train")            a sequence of CSG Program, and all their tokens
     masks = silhouettes(split="train")                 64x64 masks of furniture, without programs; logos() likewise
     mug = solid("mug")                                 one of ten everyday solids, as a tree of operations
+    clouds = solid_clouds(split="train")               point clouds of solids; read_occnet(folder) of ShapeNet's
+    mine = read_cloud("mug.obj")                       a shape of your own as a cloud
     chairs.source                                      "real", "made" or "embedded"
     print(chairs.describe())                           one sentence for the reader
 
@@ -22,11 +24,16 @@ from .csg import TokenSet, csg_programs
 from .graphs import GraphSet, part_graphs
 from .images import SOURCES as IMAGE_SOURCES
 from .images import ImageSet, logos, silhouettes
+from .occnet import read_occnet
+from .own_clouds import OwnCloud, read_cloud
 from .programs import SPLITS, ProgramSet, example, example_text, examples, shapeassembly, vary
+from .solid_clouds import SOURCES as CLOUD_SOURCES
+from .solid_clouds import SolidSet, solid_clouds
 from .solids import SOLIDS, solid
 
 __all__ = [
-    "CATEGORIES", "CSG_SIZES", "CSG_SPLITS", "IMAGE_SOURCES", "REPOSITORY", "SOLIDS", "SPLITS", "DataError", "DataSet",
-    "GraphSet", "ImageSet", "ProgramSet", "TokenSet", "csg_programs", "data_root", "example", "example_text",
-    "examples", "logos", "part_graphs", "shapeassembly", "silhouettes", "solid", "vary",
+    "CATEGORIES", "CLOUD_SOURCES", "CSG_SIZES", "CSG_SPLITS", "IMAGE_SOURCES", "REPOSITORY", "SOLIDS",
+    "SPLITS", "DataError", "DataSet", "GraphSet", "ImageSet", "OwnCloud", "ProgramSet", "SolidSet",
+    "TokenSet", "csg_programs", "data_root", "example", "example_text", "examples", "logos", "part_graphs",
+    "read_cloud", "read_occnet", "shapeassembly", "silhouettes", "solid", "solid_clouds", "vary",
 ]  # fmt: skip

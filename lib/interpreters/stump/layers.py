@@ -36,17 +36,25 @@ def signed(
     w_i: Bool[Tensor, "k c"],
     w_u: Bool[Tensor, " c"],
 ) -> Float[Tensor, " m"]:
-    """The largest of a node's distances (a complement's has the other sign), and the smallest of the united nodes'.
+    """T: the smallest of the united nodes' `signed_nodes`; of none it is inf.
 
-    Nowhere farther from 0 than the surface is away, if the distances are. An intersection of nothing is -inf; a union
-    of nothing inf.
+    Nowhere farther from 0 than the surface is away, if the distances are.
     """
+    if not w_u.any():
+        return torch.full_like(distances[0], torch.inf)
+    return signed_nodes(distances, w_c, w_i[:, w_u]).amin(0)
+
+
+def signed_nodes(
+    distances: Float[Tensor, "k m"], w_c: Bool[Tensor, " k"], w_i: Bool[Tensor, "k c"]
+) -> Float[Tensor, "c m"]:
+    """S: the largest of a node's distances, where a complement's has the other sign; of nothing it is -inf."""
     turned = torch.where(w_c.unsqueeze(1), -distances, distances)
-    smallest = torch.full_like(distances[0], torch.inf)
-    for rows in w_i[:, w_u].T:
-        node = turned[rows].amax(0) if rows.any() else torch.full_like(smallest, -torch.inf)
-        smallest = torch.minimum(smallest, node)
-    return smallest
+    nodes = distances.new_full((w_i.shape[1], distances.shape[1]), -torch.inf)
+    for c, rows in enumerate(w_i.T):
+        if rows.any():
+            nodes[c] = turned[rows].amax(0)
+    return nodes
 
 
 def soft(

@@ -1,0 +1,139 @@
+"""Figures of what networks say of clouds: faces belong to the node that made them; a slider moves a stump's number."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from lib.interpreters.openscad import read
+from lib.interpreters.stump import Box, Sphere, parse
+from lib.models.reconstructing import surface
+from lib.models.soft_stump import SoftStump
+from lib.viewing.stump_net_figures import (
+    gap_figure,
+    owners,
+    parts_of,
+    plain,
+    rivals,
+    rivals_figure,
+    rivals_table,
+    sheet,
+    training_figure,
+    use_figure,
+)
+from lib.viewing.stump_sliders import StumpSliders
+from tests.conftest import unchecked
+
+CORNERS = torch.cartesian_prod(*[torch.tensor([-0.4, 0.0, 0.4])] * 3)
+TWO = parse("""F1 = box(half=(0.1, 0.2, 0.1), translation=(-0.2, 0, 0))
+F2 = sphere(radius=0.15, translation=(0.2, 0, 0))
+S1 = F1
+S2 = F2
+T = S1 | S2
+""")
+
+
+def answer() -> SoftStump:
+    """A box on the left, node 2; a ball on the right, node 0; node 1 is not united."""
+    boxes = Box(torch.tensor([[[0.1, 0.2, 0.1]]]), torch.tensor([[[-0.2, 0, 0]]]))
+    balls = Sphere(torch.tensor([[0.15]]), torch.tensor([[[0.2, 0, 0]]]))
+    yes, no = 4.0, -4.0
+    selects = torch.tensor([[[no, yes, yes], [yes, yes, no]]])
+    return SoftStump((boxes, balls), torch.tensor([[no, no]]), selects, torch.tensor([[yes, no, yes]]))
+
+
+def test_points_belong_to_the_node_they_are_in():
+    node, primitive = owners(answer(), torch.tensor([[-0.2, 0, 0], [0.2, 0, 0], [-0.3, 0.1, 0]]))
+    assert node.tolist() == [2, 0, 2] and primitive.tolist() == [0, 1, 0]
+    said = answer()
+    said.union.fill_(-1)
+    with pytest.raises(ValueError, match="unites no node"):
+        owners(said, torch.zeros(1, 3))
+
+
+@pytest.mark.parametrize("by", ["node", "primitive"])
+def test_faces_have_the_colour_of_what_made_them(by):
+    said = answer()
+    mesh = surface(lambda points: said.signed(said.distances(points[None]))[0], CORNERS)
+    colors = parts_of(said, mesh, by).visual.face_colors
+    left = mesh.triangles_center[:, 0] < 0
+    assert len(np.unique(colors[left], axis=0)) == len(np.unique(colors[~left], axis=0)) == 1
+    assert (colors[left][0] != colors[~left][0]).any()
+    assert len(np.unique(plain(mesh).visual.face_colors, axis=0)) == 1
+    with pytest.raises(ValueError, match="'node' or 'primitive'"):
+        parts_of(said, mesh, "part")
+    assert parts_of(said, trimesh.Trimesh()).is_empty
+
+
+def test_a_sheet_has_a_picture_for_each_shape():
+    box = trimesh.creation.box()
+    figure = sheet({"cloud": [CORNERS, CORNERS], "answer": [box, trimesh.Trimesh()]}, ["a", "b"])
+    assert len(figure.axes) == 4 and figure.axes[2].get_ylabel() == "answer"
+    assert [ax.get_xlabel() for ax in figure.axes[2:]] == ["a", "b"]
+    with pytest.raises(ValueError, match="expected as many"):
+        sheet({"cloud": [CORNERS], "answer": []})
+
+
+def test_curves_and_bars_show_what_they_are_given():
+    log = [
+        {"epoch": k, "reconstruction": 0.2 / k, "val_soft_iou": 0.5, "val_iou": 0.1 * k} for k in (1, 2, 3)
+    ]
+    left, right = training_figure(log).axes
+    assert left.lines[0].get_ydata().tolist() == pytest.approx([0.2, 0.1, 0.2 / 3])
+    assert right.lines[1].get_ydata() == pytest.approx([10, 20, 30])
+    assert [text.get_text() for text in gap_figure(answer(), 8.0).axes[0].get_legend().get_texts()] == [
+        "steepness 1",
+        "steepness 8",
+    ]
+    assert use_figure({"node": np.eye(3)}).axes[0].images[0].get_array().tolist() == np.eye(3).tolist()
+
+
+def test_the_table_has_the_measured_rows(tmp_path):
+    row = {
+        "chamfer_mean": 1.234,
+        "chamfer_sum": 2.468,
+        "iou": 70.0,
+        "f_score": 50.0,
+        "primitives": 3.0,
+        "seconds": 0.1,
+    }
+    path = tmp_path / "r.json"
+    path.write_text(json.dumps({"rows": {"zebra": row, "bounding_box": row | {"nodes": 1.0}}}))
+    assert list(rivals(path)) == ["bounding box", "zebra"]
+    lines = rivals_table(path).splitlines()
+    assert lines[1].split()[2:4] == ["1.23", "2.47"] and lines[2].split()[6] == "-"
+    assert len(rivals_figure(path).axes[0].texts) == 2
+    with pytest.raises(FileNotFoundError, match="measure_stump_net"):
+        rivals(tmp_path / "none.json")
+
+
+def test_a_slider_moves_a_number():
+    widget = StumpSliders(TWO, CORNERS)
+    assert list(widget.numbers)[:3] == ["half x", "half y", "half z"] and widget.chosen == 0
+    before = widget.surface().volume
+    widget.set("half x", 0.15)
+    assert widget.numbers["half x"] == pytest.approx(0.15)
+    assert widget.surface().volume == pytest.approx(before * 1.3, rel=0.1)  # the ball stays
+    assert read(widget.text).structure == TWO.structure
+    widget.choose(1)
+    assert list(widget.numbers)[0] == "radius" and widget.numbers["radius"] == pytest.approx(0.15)
+    widget.reset()
+    assert widget.stump == TWO.to(torch.float32) and "StumpSliders" in repr(widget)
+
+
+def test_the_menu_chooses_and_the_picture_follows():
+    widget = StumpSliders(TWO, CORNERS)
+    before = widget._image.value
+    widget._menu.value = 1
+    assert widget.chosen == 1 and widget._image.value != before and widget._image.value[1:4] == b"PNG"
+
+
+def test_what_is_no_solid_stump_is_refused():
+    with unchecked(), pytest.raises(TypeError, match="expected a Stump"):
+        StumpSliders("F1 = box", CORNERS)
+    with pytest.raises(ValueError, match="one of space"):
+        StumpSliders(parse("F1 = circle(radius=1)\nS1 = F1\nT = S1\n"), CORNERS)
+    with pytest.raises(ValueError, match="expected 0 to 1"):
+        StumpSliders(TWO, CORNERS).choose(2)

@@ -1,7 +1,6 @@
 """Checkers for 12_csg_stump_net: functions are tried on random inputs, numbers compared with formulas."""
 
 import math
-from collections.abc import Callable
 
 import torch
 from jaxtyping import Bool
@@ -126,7 +125,7 @@ def _greedy(inside: Bool[Tensor, "c m"]) -> Bool[Tensor, " c"]:
     return kept
 
 
-def _tried(answer: Callable, *given: Tensor) -> object:
+def _tried(answer: object, *given: Tensor) -> object:
     """What the function returns, or a hint where it is none or fails."""
     if not callable(answer):
         return hint("the answer is a function")

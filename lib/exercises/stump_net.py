@@ -41,9 +41,9 @@ def check_low_rank(answer: object) -> str:
     generator = torch.Generator().manual_seed(0)
     for k, c, d in ((4, 2, 5), (3, 3, 3), (1, 6, 2)):
         p, n, g = (torch.randn(*size, generator=generator) for size in ((k, d), (c, d), (d,)))
-        found = _tried(answer, p, n, g)
-        if isinstance(found, str):
-            return found
+        found, problem = _tried(answer, p, n, g)
+        if problem:
+            return problem
         if not isinstance(found, Tensor) or found.shape != (k, c):
             return hint(
                 f"for K = {k}, C = {c} the result should be a tensor ({k}, {c}), found {_shape(found)}"
@@ -81,9 +81,9 @@ def check_use(answer: object) -> str:
     generator = torch.Generator().manual_seed(1)
     for k, c in ((4, 3), (5, 4), (3, 5)):
         w_i, w_u = torch.rand(k, c, generator=generator) < 0.4, torch.rand(c, generator=generator) < 0.5
-        found = _tried(answer, w_i, w_u)
-        if isinstance(found, str):
-            return found
+        found, problem = _tried(answer, w_i, w_u)
+        if problem:
+            return problem
         try:
             got = tuple(int(value) for value in found)
         except Exception:  # whatever it is, it becomes a hint
@@ -102,9 +102,9 @@ def check_cover(answer: object) -> str:
     generator = torch.Generator().manual_seed(2)
     for c, share in ((5, 0.4), (12, 0.25), (30, 0.15)):
         inside = torch.rand(c, 400, generator=generator) < share * torch.rand(c, 1, generator=generator)
-        found = _tried(answer, inside.clone())
-        if isinstance(found, str):
-            return found
+        found, problem = _tried(answer, inside.clone())
+        if problem:
+            return problem
         if not isinstance(found, Tensor) or found.dtype != torch.bool or found.shape != (c,):
             return hint(f"for {c} nodes the result should be a bool tensor ({c},), found {_shape(found)}")
         held = inside[found].any(0).sum() / inside.any(0).sum()
@@ -125,14 +125,14 @@ def _greedy(inside: Bool[Tensor, "c m"]) -> Bool[Tensor, " c"]:
     return kept
 
 
-def _tried(answer: object, *given: Tensor) -> object:
-    """What the function returns, or a hint where it is none or fails."""
+def _tried(answer: object, *given: Tensor) -> tuple[object, str]:
+    """What the function returns, and a hint where it is none or fails, else nothing."""
     if not callable(answer):
-        return hint("the answer is a function")
+        return None, hint("the answer is a function")
     try:
-        return answer(*given)
+        return answer(*given), ""
     except Exception as error:  # a reader's function may fail in any way
-        return hint(f"the function failed: {str(error)[:160]}")
+        return None, hint(f"the function failed: {str(error)[:160]}")
 
 
 def _shape(found: object) -> str:

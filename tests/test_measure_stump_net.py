@@ -112,7 +112,11 @@ def test_all_rows_are_there_with_all_their_figures(found, weights):
     assert list(found["rows"]) == [*weights, "bounding_box"]
     assert list(found["rows_searched"]) == [*weights, "search"]
     for name, row in each_row(found):
-        assert set(row) == ROW | ({"nodes"} if name != "trees" else set())
+        nodes = {"nodes"} if name != "trees" else set()
+        needed = (
+            {"needed_primitives", "needed_nodes"} if name not in ("trees", *measure_stump_net.OWN) else set()
+        )
+        assert set(row) == ROW | nodes | needed
 
 
 def test_the_result_says_what_was_measured(found, weights):

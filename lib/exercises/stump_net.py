@@ -3,9 +3,9 @@
 import math
 
 import torch
-from jaxtyping import Bool
 from torch import Tensor
 
+from ..models.simplifying import cover
 from . import OK, UNANSWERED, hint
 
 TENTH = math.log(
@@ -110,19 +110,9 @@ def check_cover(answer: object) -> str:
         held = inside[found].any(0).sum() / inside.any(0).sum()
         if held < COVER:
             return hint(f"the nodes that are kept hold {held:.1%} of the points; expected 99 % or more")
-        if found.sum() > _greedy(inside).sum():
-            return hint(f"{int(found.sum())} nodes are kept, and {int(_greedy(inside).sum())} would do")
+        if found.sum() > len(cover(inside, COVER)):
+            return hint(f"{int(found.sum())} nodes are kept, and {len(cover(inside, COVER))} would do")
     return OK
-
-
-def _greedy(inside: Bool[Tensor, "c m"]) -> Bool[Tensor, " c"]:
-    """The node that adds most, again and again, until 99 % are held."""
-    kept, held = torch.zeros(len(inside), dtype=torch.bool), torch.zeros_like(inside[0])
-    while held.sum() < COVER * inside.any(0).sum():
-        best = (inside & ~held).sum(1).argmax()
-        kept[best] = True
-        held |= inside[best]
-    return kept
 
 
 def _tried(answer: object, *given: Tensor) -> tuple[object, str]:

@@ -47,6 +47,7 @@ QUANTITIES = {
     "f_score": ("F %", ".1f"),
     "primitives": ("primitives", ".1f"),
     "nodes": ("nodes", ".1f"),
+    "needed_nodes": ("needed", ".1f"),
     "seconds": ("s/shape", ".2f"),
 }
 _TINT, _PLAIN = 0.35, (188, 206, 232, 255)
@@ -203,15 +204,20 @@ def rivals_table(path: Path = RESULT, rows: str = "rows") -> str:
 
 
 def rivals_figure(path: Path = RESULT) -> Figure:
-    """Chamfer distance and used primitives of each row, as dots: the farther down and left, the better."""
-    figure, ax = plt.subplots(figsize=(6.2, 3.4), dpi=100)
+    """Bars: Chamfer distance (shorter is better) and IoU (longer is better) of each row."""
+    found = rivals(path)
+    figure, axes = plt.subplots(1, 2, figsize=(9.5, 0.34 * len(found) + 0.9), dpi=100, sharey=True)
     plt.close(figure)
-    for number, (name, row) in enumerate(rivals(path).items()):
-        at = row["primitives"], row["chamfer_mean"]
-        ax.scatter(*at, color=COLORS[number % len(COLORS)], s=42)
-        ax.annotate(name, at, (6, 4), textcoords="offset points", fontsize=8)
-    ax.set(xlabel="primitives used", ylabel="Chamfer distance x 1000", yscale="log")
-    ax.margins(x=0.25)
-    ax.spines[["top", "right"]].set_visible(False)
+    panels = {
+        "chamfer_mean": "Chamfer distance x 1000, mean of both ways",
+        "iou": "IoU of the test points, %",
+    }
+    for ax, (key, title) in zip(axes, panels.items()):
+        bars = ax.barh(list(found), [row[key] for row in found.values()], color=COLORS[: len(found)])
+        ax.bar_label(bars, fmt="%.2f" if key == "chamfer_mean" else "%.1f", fontsize=8, padding=2)
+        ax.set_title(title, fontsize=9)
+        ax.margins(x=0.12)
+        ax.spines[["top", "right"]].set_visible(False)
+    axes[0].invert_yaxis()
     figure.tight_layout()
     return figure

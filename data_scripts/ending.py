@@ -2,11 +2,20 @@
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
-from lib.datasets import DataError
+from lib.datasets import DataError, data_root
 from lib.extractor import PartGraphError
 
 GOES_ON = "interrupted; the same command goes on from here"
+
+
+def default_root() -> Path:
+    """`data_root()`, as an option's default. Where that is no folder, the command ends with exit code 1."""
+    try:
+        return data_root()
+    except DataError as error:
+        sys.exit(_said(f"{type(error).__name__}: {error}", 1))
 
 
 def exit_code(work: Callable[[], object], interrupted: str = GOES_ON) -> int:

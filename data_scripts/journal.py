@@ -65,8 +65,10 @@ _ADVICE = "choose another --out, or remove that folder to begin anew"
 
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file that a killed run never leaves half under its real name; one that is the same is left alone. Behind
-    a link, the file that it leads to is written."""
+    a link, the file that it leads to is written. Raises DataError where a folder or a device is in the way."""
     path = path.resolve()
+    if path.exists() and not path.is_file():
+        raise DataError(f"{path} is a folder, a device, or the like; expected the name of a file to write")
     if path.is_file() and path.read_bytes() == content:
         return
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -28,6 +28,8 @@ def is_made(folder: Path, source: str, settings: dict) -> bool:
         content = (folder / f"{source}.npz").read_bytes()
     except (OSError, ValueError):
         return False
+    if not isinstance(report, dict):
+        return False
     whole = report.get("sha256") == hashlib.sha256(content).hexdigest()
     return whole and report.get("settings") == settings
 

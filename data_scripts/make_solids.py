@@ -32,6 +32,7 @@ import trimesh
 from data_scripts import sweethome
 from data_scripts.ending import exit_code
 from data_scripts.made_files import code_of, is_made, replaces, write_made
+from data_scripts.measuring import check_writable
 from data_scripts.shape_sources import MIT, Item, Source, draw_all, furniture, models, programs
 from lib.datasets import DataError, data_root
 from lib.datasets.images import SHARES, SPLITS, split_of
@@ -158,6 +159,8 @@ def make_one(name: str, options: argparse.Namespace) -> str:
         return f"{path} is complete and up to date: nothing to do"
     if replaces(options.out, name, wanted) and not options.force:
         raise DataError(f"{path} was made of something else; choose another --out, or --force to replace it")
+    for ending in ("npz", "json"):
+        check_writable(options.out / f"{name}.{ending}")  # both, before minutes of work
     total, items, facts = source.load()
     drawn = draw_all(name, DRAW[name], total, items, options.workers)
     report = write(options.out, name, drawn, {**facts, "settings": wanted})

@@ -48,7 +48,7 @@ from lib.models.weights import CheckpointError, load
 from lib.training.csgnet_command import spread
 
 FOLDER = REPOSITORY / "results" / "stump_net"
-NAMES = ("stump_net_64", "stump_net_32", "volumetric_primitives", "superquadrics", "ucsg")
+NAMES = ("stump_net_64", "stump_net_32", "stump_net_64_boxes", "volumetric_primitives", "superquadrics")
 OWN = ("bounding_box", "search")  # rows without a network
 POINTS = 2048  # on each surface
 SEEN = 256  # points of a cloud that a network looks at, as in its training

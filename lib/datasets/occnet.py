@@ -20,6 +20,8 @@ from .images import SPLITS
 from .solid_clouds import SolidSet, gathered
 from .solid_sampling import SolidSample
 
+FARTHEST = 1e4  # of numbers that are kept in half precision
+
 
 def read_occnet(
     folder: str | Path, split: str | None = None, points: int = 2048, queries: int = 4096, seed: int = 0
@@ -28,16 +30,21 @@ def read_occnet(
 
     split  "train", "val", "test", or None for all
     Where there are fewer points inside, or outside, some come twice. Raises DataError for a folder that is none, for
-    another split, and for files that are missing, damaged or of another kind.
+    another split, no points or an odd number of queries, and for files that are missing, damaged or of another kind.
     """
+    if points < 1 or queries < 2 or queries % 2 or seed < 0:
+        raise DataError(
+            f"found {points} points, {queries} queries, seed {seed}; expected at least 1, an even number from 2, 0"
+        )
     folder = Path(folder)
+    kind = folder.resolve().name  # of "." too
     rows = []
     for part in choose("split", split, SPLITS):
-        names = tqdm(_names(folder / f"{part}.lst"), desc=f"{folder.name} {part}", leave=False, disable=None)
-        rows += [(name, part, folder.name, _model(folder / name, points, queries, seed)) for name in names]
+        names = tqdm(_names(folder / f"{part}.lst"), desc=f"{kind} {part}", leave=False, disable=None)
+        rows += [(name, part, kind, _model(folder / name, points, queries, seed)) for name in names]
     if not rows:
         raise DataError(f"{folder}: found no models in its lists; expected some")
-    return gathered(rows, f"occnet {folder.name}")
+    return gathered(rows, f"occnet {kind}")
 
 
 def _names(path: Path) -> list[str]:
@@ -55,10 +62,16 @@ def _model(folder: Path, points: int, queries: int, seed: int) -> SolidSample:
     space = _arrays(folder / "points.npz", ("points", "occupancies"))
     inside = _bools(folder / "points.npz", space["occupancies"], len(space["points"]))
     low, high = surface["points"].min(0), surface["points"].max(0)
-    middle, diagonal = (low + high) / 2, np.linalg.norm(high - low)
-    if not diagonal > 0 or inside.all() or not inside.any():
+    with np.errstate(over="ignore"):
+        middle, diagonal = (low + high) / 2, np.linalg.norm(high - low)
+    if not 0 < diagonal < np.inf or inside.all() or not inside.any():
         raise DataError(
             f"{folder}: found no solid; expected points that differ, some inside and some outside"
+        )
+    far = max(np.abs(space["points"] - middle).max() / diagonal, np.abs(surface["normals"]).max())
+    if far > FARTHEST:
+        raise DataError(
+            f"{folder}: found points of space, or normals, up to {far:.3g}; expected at most {FARTHEST:g} diagonals"
         )
     rng = np.random.default_rng(seed)
     chosen = _some(np.arange(len(surface["points"])), points, rng)
@@ -78,7 +91,7 @@ def _arrays(path: Path, names: tuple[str, str]) -> dict[str, np.ndarray]:
     try:
         arrays = read_arrays(path, names)
     except KeyError as error:
-        raise DataError(f"{path}: found no array {error.args[0]}; expected {' and '.join(names)}") from error
+        raise DataError(f"{path}: {error.args[0]}; expected {' and '.join(names)}") from error
     for name in (name for name in names if name != "occupancies"):
         array = arrays[name]
         if array.ndim != 2 or array.shape[1] != 3 or not len(array) or array.dtype.kind != "f":
@@ -93,10 +106,11 @@ def _arrays(path: Path, names: tuple[str, str]) -> dict[str, np.ndarray]:
 
 def _bools(path: Path, given: np.ndarray, count: int) -> np.ndarray:
     """The occupancies, unpacked."""
-    found = np.unpackbits(given)[:count] if given.dtype == np.uint8 and given.ndim == 1 else given
-    if found.shape != (count,):
+    packed = given.dtype == np.uint8 and given.shape == (-(-count // 8),)
+    found = np.unpackbits(given)[:count] if packed else given
+    if found.shape != (count,) or found.dtype.kind not in "buif" or not np.isin(found, (0, 1)).all():
         raise DataError(
-            f"{path}: found occupancies {given.dtype} {given.shape}; expected {count}, or their bits"
+            f"{path}: found occupancies {given.dtype} {given.shape}; expected {count}, each 0 or 1, or their bits"
         )
     return found.astype(bool)
 

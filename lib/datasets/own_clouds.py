@@ -9,6 +9,7 @@ A mesh is sampled, uniform by area. Of a cloud without faces points are chosen. 
 twice, or that lie far from all others are left out.
 """
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,10 @@ FEWEST = 20  # points: fewer show no shape
 FAR = 8.0  # times as far from its neighbours as points are in the middle: an outlier
 NEIGHBOURS = 8
 LARGEST = 1 << 28  # bytes of a file
+MOST = 1 << 20  # points that can be asked for
+SMALL, BIG = 1e-30, 1e30  # the networks' single precision can hold what lies between
+FEWEST_SAMPLED = 100  # of a mesh, however few are asked for
+GERMAN = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")  # a number with a decimal comma, or a whole one
 
 
 @dataclass(frozen=True)
@@ -60,10 +65,15 @@ def read_cloud(path: str | Path, count: int = 2048, seed: int = 0) -> OwnCloud:
     if len(points) < count:
         told.append(f"There are fewer than {count}, so some come twice.")
     low, high = points.min(0), points.max(0)
-    middle, scale = (low + high) / 2, float(1 / np.linalg.norm(high - low))
-    told.append(
-        f"Moved by {_numbers(-middle)} and scaled by {scale:.4g}: its box of {_numbers(high - low)} has diagonal 1 now."
-    )
+    if np.abs(points).max() > BIG or (high - low).max() < SMALL:
+        raise DataError(
+            f"{path}: found x, y, z from {_numbers(low)} to {_numbers(high)}; expected a shape between {SMALL:g} and "
+            f"{BIG:g} in size"
+        )
+    middle, sides = (low + high) / 2, high - low
+    scale = float(1 / np.linalg.norm(sides))
+    moved = f"Moved by {_numbers(0 - middle)} and scaled by {scale:.4g}"  # 0 - 0 is 0, -0 would be told
+    told.append(f"{moved}: its box of {_numbers(sides)} has diagonal 1 now.")
     made = torch.from_numpy((points[chosen] - middle) * scale).float()
     return OwnCloud(made, torch.from_numpy(middle), scale, " ".join(told))
 
@@ -72,6 +82,10 @@ def _points(path: Path, count: int, seed: int) -> tuple[np.ndarray, list[str]]:
     """Points of the file, and what it holds."""
     if count < 1:
         raise DataError(f"found a count of {count}; expected 1 or more")
+    if count > MOST:
+        raise DataError(f"found a count of {count}; expected at most {MOST}")
+    if seed < 0:
+        raise DataError(f"found a seed of {seed}; expected 0 or more")
     kind = path.suffix.lower()
     if kind not in (*MESHES, *TEXTS):
         raise DataError(
@@ -80,33 +94,53 @@ def _points(path: Path, count: int, seed: int) -> tuple[np.ndarray, list[str]]:
     try:
         if path.stat().st_size > LARGEST:
             raise DataError(f"{path}: found {path.stat().st_size} bytes; expected at most {LARGEST}")
-        if kind in TEXTS:
-            return _table(path)
-        found = trimesh.load(path, process=False)
+        if not path.is_file():
+            raise DataError(f"{path}: found a folder, a device, or the like; expected a file")
+        return _table(path) if kind in TEXTS else _geometry(path, count, seed)
     except DataError:
         raise
     except Exception as error:  # readers of meshes raise whatever they meet
         raise DataError(f"{path}: cannot be read as {kind[1:]} ({error})") from error
-    if isinstance(found, trimesh.Scene):
-        found = found.to_mesh() if found.geometry else trimesh.Trimesh()
-    if getattr(found, "faces", None) is not None and len(found.faces):
-        area = found.area_faces
-        if not (np.isfinite(area).all() and area.sum() > 0):
-            raise DataError(f"{path}: found {len(found.faces)} triangles without area; expected a surface")
-        points, _ = trimesh.sample.sample_surface(found, 2 * count, seed=seed)
-        closed = "a closed surface" if found.is_watertight else "a surface with gaps"
-        return np.asarray(points), [f"A mesh of {len(found.faces)} triangles, {closed}."]
-    points = np.asarray(getattr(found, "vertices", np.zeros((0, 3))), dtype=float)
-    return points, [f"A cloud of {len(points)} points."]
+
+
+def _geometry(path: Path, count: int, seed: int) -> tuple[np.ndarray, list[str]]:
+    """Points on all meshes of a file; where it has none, all its vertices."""
+    found = trimesh.load(path, process=False)
+    parts = found.dump() if isinstance(found, trimesh.Scene) else [found]
+    meshes = [part for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    if not meshes:
+        vertices = [np.asarray(part.vertices, dtype=float).reshape(-1, 3) for part in parts]
+        points = np.concatenate([np.zeros((0, 3)), *vertices])
+        return points, [f"A cloud of {len(points)} points."]
+    mesh = trimesh.util.concatenate(meshes)
+    with np.errstate(over="ignore", invalid="ignore"):
+        area = mesh.area_faces.sum()
+    if not 0 < area < np.inf:
+        raise DataError(f"{path}: found {len(mesh.faces)} triangles of area {area:g}; expected a surface")
+    points, _ = trimesh.sample.sample_surface(mesh, max(2 * count, FEWEST_SAMPLED), seed=seed)
+    closed = "a closed surface" if _is_closed(mesh) else "a surface with gaps"
+    return np.asarray(points), [f"A mesh of {len(mesh.faces)} triangles, {closed}."]
+
+
+def _is_closed(mesh: trimesh.Trimesh) -> bool:
+    """Whatever common corners the file repeats: all in STL, others at seams."""
+    corners, numbers = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    return trimesh.Trimesh(corners, numbers.reshape(-1)[mesh.faces], process=False).is_watertight
 
 
 def _table(path: Path) -> tuple[np.ndarray, list[str]]:
-    """A text with x, y and z first in each line, between spaces or commas; all else in a line is not looked at."""
+    """A text with x, y and z first in each line, between spaces, commas or semicolons; all else is not looked at.
+
+    Between spaces or semicolons numbers may have decimal commas.
+    """
     rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
-        words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split("#")[0].replace(";", " ").split()
+        if len(words) < 3 or not all(map(GERMAN.fullmatch, words[:3])):
+            words = " ".join(words).replace(",", " ").split()
         try:
-            row = [float(word) for word in words[:3]]
+            row = [float(word.replace(",", ".")) for word in words[:3]]
         except ValueError:
             if not rows:
                 continue  # a heading
@@ -115,6 +149,8 @@ def _table(path: Path) -> tuple[np.ndarray, list[str]]:
             rows.append(row)
         elif words and rows:
             raise DataError(f"{path}, line {number}: found {len(row)} numbers; expected x y z")
+    if not rows:
+        raise DataError(f"{path}: found no line that begins with three numbers; expected one for each point")
     return np.array(rows).reshape(-1, 3), [f"A cloud of {len(rows)} points."]
 
 

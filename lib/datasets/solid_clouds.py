@@ -119,7 +119,10 @@ def read(path: Path, source: str) -> SolidSet:
             f"{path}: it has no clouds as the data script writes them ({error.args[0]})"
         ) from error
     texts = {name: arrays.pop(name) for name in TEXTS}
-    count = len(texts["ids"])
+    count = texts["ids"].size
+    for name, column in texts.items():
+        if column.dtype.kind != "U" or column.shape != (count,):
+            raise DataError(f"{path}: found {name} {column.dtype} {column.shape}; expected {count} texts")
     for name, array in arrays.items():
         if array.dtype != np.float16 or array.ndim != 3 or array.shape[::2] != (count, 3):
             raise DataError(
@@ -127,9 +130,12 @@ def read(path: Path, source: str) -> SolidSet:
             )
         if not np.isfinite(array).all():
             raise DataError(f"{path}: found {name} that are not finite; expected numbers")
-    for name, column in texts.items():
-        if column.dtype.kind != "U" or column.shape != (count,):
-            raise DataError(f"{path}: found {name} {column.dtype} {column.shape}; expected {count} texts")
+    points, normals, queries = (arrays[name].shape[1] for name in ARRAYS)
+    if not points or normals != points or queries < 2 or queries % 2:
+        raise DataError(
+            f"{path}: found {points} points, {normals} normals and {queries} queries of each; expected as many normals "
+            "as points, 1 or more, and an even number of queries, 2 or more"
+        )
     if unknown := set(texts["splits"].tolist()) - set(SPLITS):
         raise DataError(f"{path}: found the split {min(unknown)!r}; expected {', '.join(SPLITS)}")
     return SolidSet(arrays, {name: column.tolist() for name, column in texts.items()}, source)

@@ -34,8 +34,9 @@ COMMAND = "python -m data_scripts.measure_stump_net"
 NAMES = {
     "stump_net_64": "CSG-Stump Net, K = C = 64",
     "stump_net_32": "CSG-Stump Net, K = C = 32",
-    "volumetric_primitives": "volumetric primitives",
-    "superquadrics": "superquadrics",
+    "stump_net_64_boxes": "CSG-Stump Net, 64 boxes",
+    "volumetric_primitives": "volumetric primitives, 64",
+    "superquadrics": "superquadrics, 64",
     "ucsg": "UCSG-Net's way",
     "bounding_box": "bounding box",
     "search": "search (notebook 11)",

@@ -29,7 +29,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from lib.datasets import CATEGORIES, DataError, data_root
+from data_scripts.ending import default_root
+from lib.datasets import CATEGORIES, DataError
 
 URL = "https://github.com/rkjones4/ShapeAssembly/archive/refs/heads/master.tar.gz"
 PROGRAMS = {"chair": 3835, "table": 6536, "storage": 1551}
@@ -216,7 +217,9 @@ def main(arguments: list[str] | None = None) -> int:
     """The command; returns the exit code. Problems are one line on stderr."""
     parser = argparse.ArgumentParser(description="Fetch the real ShapeAssembly programs.")
     parser.add_argument("--archive", type=Path, help="use this .tar.gz, .tar.xz or .zip, download nothing")
-    parser.add_argument("--out", type=Path, default=data_root(), help="the data root (default: %(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=default_root(), help="the data root (default: %(default)s)"
+    )
     options = parser.parse_args(arguments)
     try:
         print(summary(fetch(options.out, options.archive)))

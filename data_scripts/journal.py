@@ -67,8 +67,7 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write a file that a killed run never leaves half under its real name; one that is the same is left alone. Behind
     a link, the file that it leads to is written. Raises DataError where a folder or a device is in the way."""
     path = path.resolve()
-    if path.exists() and not path.is_file():
-        raise DataError(f"{path} is a folder, a device, or the like; expected the name of a file to write")
+    check_place(path)
     if path.is_file() and path.read_bytes() == content:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -79,6 +78,12 @@ def write_whole(path: Path, content: bytes) -> None:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def check_place(path: Path) -> None:
+    """Raises DataError where a folder or a device has the name of a file that is to be written."""
+    if path.exists() and not path.is_file():
+        raise DataError(f"{path} is a folder, a device, or the like; expected the name of a file to write")
 
 
 def code_digest(*parts: str) -> str:

@@ -22,11 +22,11 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from data_scripts.ending import exit_code
+from data_scripts.ending import default_root, exit_code
 from data_scripts.fetch_shapeassembly import write
 from data_scripts.journal import Journal, code_digest, write_whole
 from data_scripts.parallel import end_with, in_parallel
-from lib.datasets import CATEGORIES, SPLITS, DataError, data_root, shapeassembly
+from lib.datasets import CATEGORIES, SPLITS, DataError, shapeassembly
 from lib.datasets.programs import ABLATED
 from lib.extractor.rewriting import ABLATIONS, Rewriting, rewrite_many
 from lib.interpreters.shapeassembly import parse
@@ -147,7 +147,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--categories", nargs="+", choices=CATEGORIES, default=CATEGORIES, metavar="CATEGORY")
     parser.add_argument("--ablations", nargs="+", choices=ABLATIONS, default=ABLATIONS, metavar="ABLATION")
     parser.add_argument("--workers", type=int, default=-1, help="processes (default: one for each core)")
-    parser.add_argument("--out", type=Path, default=data_root(), help="the data root (default: %(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=default_root(), help="the data root (default: %(default)s)"
+    )
     options = parser.parse_args(arguments)
     if options.workers < 1 and options.workers != -1:
         parser.error("--workers must be 1 or more")

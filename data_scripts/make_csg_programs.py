@@ -25,10 +25,10 @@ import numpy as np
 from tqdm import tqdm
 
 from data_scripts.csg_worker import Chunk, make_chunk
-from data_scripts.ending import exit_code
+from data_scripts.ending import default_root, exit_code
 from data_scripts.journal import code_digest, difference, write_whole
 from data_scripts.parallel import in_parallel
-from lib.datasets import CSG_SIZES, CSG_SPLITS, DataError, data_root
+from lib.datasets import CSG_SIZES, CSG_SPLITS, DataError
 from lib.interpreters.csg import vocabulary_of
 
 # Programs a worker makes at once, by dimension; fixed, because it decides what comes out.
@@ -259,7 +259,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--dimensions", type=int, choices=(2, 3), default=2, help="2: the plane (default), 3: space"
     )
-    parser.add_argument("--out", type=Path, default=data_root() / "csg", help=_OUT)
+    parser.add_argument("--out", type=Path, default=default_root() / "csg", help=_OUT)
     parser.add_argument("--force", action="store_true", help="replace programs made with other settings")
     parser.add_argument(
         "--seed", type=int, default=0, help="other seeds, other programs (default: %(default)s)"

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from data_scripts.ending import exit_code
-from lib.datasets import CATEGORIES, DataError, data_root
+from data_scripts.ending import default_root, exit_code
+from lib.datasets import CATEGORIES, DataError
 from lib.furniture import make
 
 
@@ -62,7 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--category", choices=CATEGORIES, help="only this one (default: all three)")
     parser.add_argument("--count", type=int, default=5000, help="how many of each (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the first one (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=data_root() / "furniture", help="default: %(default)s")
+    parser.add_argument("--out", type=Path, default=default_root() / "furniture", help="default: %(default)s")
     options = parser.parse_args(arguments)
     if options.count < 1 or options.seed < 0:
         parser.error("--count must be 1 or more, --seed 0 or more")

@@ -29,7 +29,7 @@ import numpy as np
 from tqdm import tqdm
 
 from data_scripts import mask_files
-from data_scripts.ending import exit_code
+from data_scripts.ending import default_root, exit_code
 from data_scripts.made_files import is_made
 from data_scripts.mask_files import Drawn
 from data_scripts.packages import Package, obtain
@@ -126,7 +126,9 @@ def main(arguments: list[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--package", type=Path, help="use this .tgz of simple-icons, download nothing")
-    parser.add_argument("--out", type=Path, default=data_root() / "silhouettes", help="default: %(default)s")
+    parser.add_argument(
+        "--out", type=Path, default=default_root() / "silhouettes", help="default: %(default)s"
+    )
     parser.add_argument("--sheet", action="store_true", help="write a contact sheet, too")
     options = parser.parse_args(arguments)
     return exit_code(lambda: print(make(options)), "interrupted: nothing was changed")

@@ -22,11 +22,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from data_scripts import mask_files, sweethome
-from data_scripts.ending import exit_code
+from data_scripts.ending import default_root, exit_code
 from data_scripts.made_files import is_made, replaces
 from data_scripts.mask_files import Drawn
 from data_scripts.shape_sources import Item, Source, draw_all, furniture, models, programs
-from lib.datasets import IMAGE_SOURCES, DataError, data_root
+from lib.datasets import IMAGE_SOURCES, DataError
 from lib.datasets.images import read, views_of
 from lib.interpreters.rasterising import VIEWS, box_triangles, silhouettes
 from lib.interpreters.shapeassembly import ProgramError, execute_many
@@ -121,7 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--package", type=Path, help="use this .deb of sweethome3d-furniture, download nothing"
     )
-    parser.add_argument("--out", type=Path, default=data_root() / "silhouettes", help=OUT)
+    parser.add_argument("--out", type=Path, default=default_root() / "silhouettes", help=OUT)
     parser.add_argument("--force", action="store_true", help="replace masks that were made of something else")
     parser.add_argument("--workers", type=int, default=-1, help="processes (default: one for each core)")
     parser.add_argument("--sheet", action="store_true", help="write contact sheets, too")

@@ -30,11 +30,11 @@ import numpy as np
 import trimesh
 
 from data_scripts import sweethome
-from data_scripts.ending import exit_code
+from data_scripts.ending import default_root, exit_code
+from data_scripts.journal import check_place
 from data_scripts.made_files import code_of, is_made, replaces, write_made
-from data_scripts.measuring import check_writable
 from data_scripts.shape_sources import MIT, Item, Source, draw_all, furniture, models, programs
-from lib.datasets import DataError, data_root
+from lib.datasets import DataError
 from lib.datasets.images import SHARES, SPLITS, split_of
 from lib.datasets.solid_clouds import ARRAYS, SOURCES, TEXTS, gathered, in_boxes
 from lib.datasets.solid_sampling import SolidSample, by_winding, sample_solid
@@ -160,7 +160,7 @@ def make_one(name: str, options: argparse.Namespace) -> str:
     if replaces(options.out, name, wanted) and not options.force:
         raise DataError(f"{path} was made of something else; choose another --out, or --force to replace it")
     for ending in ("npz", "json"):
-        check_writable(options.out / f"{name}.{ending}")  # both, before minutes of work
+        check_place(options.out / f"{name}.{ending}")  # both, before minutes of work
     total, items, facts = source.load()
     drawn = draw_all(name, DRAW[name], total, items, options.workers)
     report = write(options.out, name, drawn, {**facts, "settings": wanted})
@@ -182,7 +182,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--package", type=Path, help="use this .deb of sweethome3d-furniture, download nothing"
     )
-    parser.add_argument("--out", type=Path, default=data_root() / "solids", help=OUT)
+    parser.add_argument("--out", type=Path, default=default_root() / "solids", help=OUT)
     parser.add_argument(
         "--force", action="store_true", help="replace clouds that were made of something else"
     )

@@ -1,11 +1,13 @@
 """Making point clouds of solids: each source, the same bytes again, what is left out, and nothing half."""
 
 import json
+import os
 
 import numpy as np
 import pytest
 
 from data_scripts import make_solids, sweethome
+from data_scripts.journal import write_whole
 from lib.datasets import CATEGORIES, DataError
 from lib.datasets.solid_clouds import solid_clouds
 from tests.packages import deb, make_zip, stand_in
@@ -110,6 +112,39 @@ def test_ctrl_c_leaves_nothing_half(root, capsys, monkeypatch):
     monkeypatch.setattr(make_solids, "sample_solid", interrupted)
     assert run(root, "--source", "csg", "--count", 1) == 130
     assert "interrupted" in capsys.readouterr().err and not (root / "solids").exists()
+
+
+@pytest.mark.parametrize("kind", ["npz", "json"])
+def test_what_is_in_the_way_is_told_before_the_work(root, tmp_path, capsys, kind):
+    """A folder, or a link to a device, which must not become a file."""
+    (root / "solids" / f"csg.{kind}").mkdir(parents=True)
+    assert run(root, "--source", "csg", "--count", 1) == 1
+    assert f"csg.{kind} is a folder, a device, or the like" in capsys.readouterr().err
+    assert len(list((root / "solids").iterdir())) == 1
+    os.mkfifo(tmp_path / "device")
+    with pytest.raises(DataError, match="device is a folder, a device"):
+        write_whole(tmp_path / "device", b"mine")
+    assert (tmp_path / "device").is_fifo()
+
+
+def test_a_damaged_report_is_made_anew(root):
+    (root / "solids").mkdir(parents=True)
+    (root / "solids" / "csg.npz").write_bytes(b"")
+    (root / "solids" / "csg.json").write_text("[]")
+    assert run(root, "--source", "csg", "--count", 1) == 0 and report(root, "csg")["solids"] == 1
+
+
+def test_a_data_root_that_is_a_file(tmp_path, monkeypatch, capsys):
+    (tmp_path / "file").write_text("mine")
+    monkeypatch.setenv("SHAPE_PROGRAMS_DATA", str(tmp_path / "file"))
+    with pytest.raises(SystemExit) as end:
+        make_solids.main(["--source", "csg", "--count", "1"])
+    told = capsys.readouterr().err
+    assert (
+        end.value.code == 1
+        and told.startswith("DataError: SHAPE_PROGRAMS_DATA names")
+        and told.count("\n") == 1
+    )
 
 
 @pytest.mark.parametrize("wrong", [["--count", "0"], ["--workers", "0"], ["--source", "shapenet"]])

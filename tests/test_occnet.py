@@ -62,6 +62,14 @@ def broken(folder, how):
         np.savez(points, points=arrays[0]["points"])
     elif how == "count":
         np.savez(points, points=arrays[0]["points"][:50], occupancies=np.ones(7))
+    elif how == "bytes":
+        np.savez(points, points=arrays[0]["points"], occupancies=np.packbits(np.eye(1003, dtype=bool)))
+    elif how == "chances":
+        np.savez(points, points=arrays[0]["points"], occupancies=np.linspace(0, 1, 1003))
+    elif how == "huge":
+        np.savez(surface, points=arrays[1]["points"].astype(float) * 1e200, normals=arrays[1]["normals"])
+    elif how == "far":
+        np.savez(points, points=arrays[0]["points"] * 1e9, occupancies=arrays[0]["occupancies"])
     elif how == "full":
         np.savez(points, points=arrays[0]["points"], occupancies=np.ones(1003, bool))
     elif how == "shape":
@@ -79,8 +87,12 @@ def broken(folder, how):
     [
         ("list", "train.lst: cannot be read .* expected the names of models"),
         ("model", "z/pointcloud.npz: cannot be read"),
-        ("name", "found no array .*occupancies.*; expected points and occupancies"),
-        ("count", "found occupancies float64 .*; expected 50, or their bits"),
+        ("name", "points.npz: occupancies is not a file .*; expected points and occupancies"),
+        ("count", "found occupancies float64 .*; expected 50, each 0 or 1, or their bits"),
+        ("bytes", "found occupancies uint8 .*; expected 1003"),
+        ("chances", "found occupancies float64 .*; expected 1003, each 0 or 1"),
+        ("huge", "found no solid"),
+        ("far", "found points of space, or normals, up to .*e.09; expected at most"),
         ("full", "found no solid; expected points that differ, some inside"),
         ("shape", "found points float32 .*; expected numbers"),
         ("nan", "found points that are not finite"),
@@ -92,6 +104,26 @@ def test_folders_that_are_none(folder, how, told):
     broken(folder, how)
     with pytest.raises(DataError, match=told):
         read_occnet(folder, "train")
+
+
+def test_bytes_that_are_no_bits(folder):
+    """Each a 0 or a 1, as some programs write them."""
+    points = dict(np.load(folder / "c" / "points.npz"))
+    bits = np.unpackbits(points["occupancies"])[:1003]
+    before = read_occnet(folder, "val")
+    np.savez(folder / "c" / "points.npz", points=points["points"], occupancies=bits)
+    assert np.array_equal(read_occnet(folder, "val").queries, before.queries)
+
+
+def test_the_folder_one_is_in(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert read_occnet(".", "val").categories == (folder.name,)
+
+
+@pytest.mark.parametrize("given", [{"points": 0}, {"queries": 0}, {"queries": 7}, {"seed": -1}])
+def test_numbers_that_make_no_sense(folder, given):
+    with pytest.raises(DataError, match="expected at least 1, an even number from 2, 0"):
+        read_occnet(folder, "val", **given)
 
 
 def test_no_models_and_other_splits(folder):

@@ -1,5 +1,7 @@
 """A person's own file: meshes and clouds of every kind, what is cleaned away, and what is told of bad ones."""
 
+import os
+
 import numpy as np
 import pytest
 import torch
@@ -25,7 +27,7 @@ def test_meshes(box, tmp_path, kind):
     assert torch.allclose((cloud.points.abs() / half).amax(1), torch.ones(500), atol=0.03)
     assert cloud.scale == pytest.approx(1 / 6, rel=0.02)
     assert (cloud.back(cloud.points)[:, 0] - 10).abs().max() < 1.01
-    assert "12 triangles" in cloud.told and "has diagonal 1 now" in cloud.told
+    assert "12 triangles, a closed surface" in cloud.told and "has diagonal 1 now" in cloud.told
 
 
 def test_a_text_with_a_heading_and_more_columns(tmp_path):
@@ -36,6 +38,32 @@ def test_a_text_with_a_heading_and_more_columns(tmp_path):
     assert "A cloud of 400 points." in cloud.told
     back = cloud.back(cloud.points.double()).numpy()
     assert np.abs(back[:, None] - points[None]).max(2).min(1).max() < 1e-5  # they are some of these
+
+
+@pytest.mark.parametrize(
+    "start, apart, comma",
+    [("\ufeff", " ", "."), ("", "; ", ","), ("", " ", ","), ("", ", ", "."), ("", ",", ".")],
+)
+def test_how_a_text_may_be_written(tmp_path, start, apart, comma):
+    """A byte order mark, and decimal commas, as spreadsheets write them."""
+    points = np.random.default_rng(0).integers(-9, 9, size=(60, 3)) / 4
+    lines = [apart.join(f"{x:g}".replace(".", comma) for x in row) for row in points]
+    (tmp_path / "cloud.txt").write_text(start + "\n".join(lines), encoding="utf-8")
+    cloud = read_cloud(tmp_path / "cloud.txt", 100)
+    assert "A cloud of 60 points." in cloud.told
+    back = cloud.back(cloud.points.double()).numpy()
+    assert np.abs(back[:, None] - points[None]).max(2).min(1).max() < 1e-5
+
+
+def test_few_points_of_a_mesh(box, tmp_path):
+    box.export(tmp_path / "box.off")
+    assert read_cloud(tmp_path / "box.off", 1).points.shape == (1, 3)
+
+
+def test_a_cloud_in_a_scene(tmp_path):
+    points = np.random.default_rng(0).uniform(size=(60, 3))
+    trimesh.Scene([trimesh.PointCloud(points)]).export(tmp_path / "cloud.glb")
+    assert "A cloud of 60 points." in read_cloud(tmp_path / "cloud.glb", 100).told
 
 
 def test_a_cloud_without_faces(tmp_path):
@@ -68,13 +96,20 @@ def test_the_seed_decides(box, tmp_path):
         ("a.step", "x", "found a file .step; expected .obj, .ply"),
         ("a", "x", "found a file without an ending"),
         ("a.obj", "", "found 0 points that differ; expected a shape"),
+        ("a.obj", "v 1 2\nv 2 3\nv 3 3\nf 1 2 3\n", "cannot be read as obj"),
+        ("a.xyz", "", "found no line that begins with three numbers"),
+        ("a.csv", '"1","2","3"\n' * 50, "found no line that begins with three numbers"),
+        ("a.xyz", "".join(f"{k}e300 1 {k % 7}\n" for k in range(50)), "expected a shape between 1e-30 and"),
+        ("a.xyz", "".join(f"{k}e-300 0 {k % 7}e-300\n" for k in range(50)), "expected a shape between 1e-30"),
         ("a.ply", "ply nonsense", "cannot be read as ply"),
         ("a.stl", "solid", "a.stl: "),
         ("a.xyz", "1 2 3\n4 five 6\n", "line 2: found '4 five 6'; expected numbers"),
         ("a.xyz", "1 2 3\n4 5\n", "line 2: found 2 numbers; expected x y z"),
         ("a.xyz", "1 2 3\n" * 50, "found 1 points that differ"),
         ("a.xyz", "nan nan nan\n" * 50, "found 0 points"),
-        ("a.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "found 1 triangles without area"),
+        ("a.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "found 1 triangles of area 0"),
+        ("a.obj", "v nan 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n", "found 1 triangles of area nan"),
+        ("a.obj", "v 1e200 0 0\nv 0 1e200 0\nv 0 0 1\nf 1 2 3\n", "found 1 triangles of area inf"),
     ],
 )
 def test_files_that_show_no_shape(tmp_path, name, content, told):
@@ -88,3 +123,16 @@ def test_a_file_that_is_not_there(tmp_path):
         read_cloud(tmp_path / "none.obj")
     with pytest.raises(DataError, match="found a count of 0"):
         read_cloud(tmp_path / "none.obj", 0)
+    with pytest.raises(DataError, match="found a count of 1000000000000; expected at most"):
+        read_cloud(tmp_path / "none.obj", 10**12)
+    with pytest.raises(DataError, match="found a seed of -1"):
+        read_cloud(tmp_path / "none.obj", seed=-1)
+    (tmp_path / "folder.xyz").mkdir()
+    with pytest.raises(DataError, match="found a folder, a device"):
+        read_cloud(tmp_path / "folder.xyz")
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.obj")
+    with pytest.raises(DataError, match="found a folder, a device"):
+        read_cloud(tmp_path / "pipe.obj")

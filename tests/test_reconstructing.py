@@ -98,6 +98,25 @@ def test_an_empty_field_has_an_empty_mesh(field):
     assert mesh.is_empty and len(mesh.faces) == 0
 
 
+@pytest.mark.parametrize(
+    "cloud, cell, told",
+    [
+        (CLOUD[:0], 0.1, "without points"),
+        (CLOUD * torch.nan, 0.1, "found a box of"),
+        (CLOUD * 1e6, 1 / 64, "expected at most 33554432 cells"),
+        *((CLOUD, cell, "and cells of") for cell in (0.0, -1.0, torch.nan, torch.inf, 1e-5)),
+    ],
+)
+def test_clouds_and_cells_without_sense_are_told(cloud, cell, told):
+    with pytest.raises(ValueError, match=told):
+        surface(lambda points: torch.ones(len(points)), cloud, cell)
+
+
+def test_a_field_that_is_no_number_is_told():
+    with pytest.raises(ValueError, match="found a field that is no number"):
+        surface(lambda points: torch.where(points[:, 0] > 0, torch.nan, -1.0), CLOUD)
+
+
 def test_a_cloud_without_thickness_has_an_empty_mesh():
     assert surface(lambda points: -torch.ones(len(points)), CLOUD * torch.tensor([1.0, 1, 0])).is_empty
 

@@ -18,6 +18,7 @@ def test_the_most_important_come_first():
     inside = rows("xx......", "..xxxx..", "....xxx.", "........")
     assert cover(inside, 1.0).tolist() == [1, 0, 2]
     assert cover(inside, 6 / 7).tolist() == [1, 0]
+    assert cover(inside[:0], 1.0).tolist() == []
     assert cover(inside, 0.0).tolist() == [] == cover(rows("....", "...."), 1.0).tolist()
 
 
@@ -48,3 +49,5 @@ def test_hidden_and_empty_nodes_go():
     assert torch.equal(less.inside(distances), said.inside(distances))
     assert (simplified(said, CROWD, 0.5).union > 0).tolist() == [[True, False, False, False]]
     assert (said.union > 0).all()
+    with pytest.raises(ValueError, match="found points that are not finite"):
+        simplified(said, CROWD * torch.nan)

@@ -8,7 +8,7 @@ import torch
 import trimesh
 
 from lib.interpreters.openscad import read
-from lib.interpreters.stump import Box, Sphere, parse
+from lib.interpreters.stump import Box, ProgramError, Sphere, parse
 from lib.models.reconstructing import surface
 from lib.models.soft_stump import SoftStump
 from lib.viewing.stump_net_figures import (
@@ -74,6 +74,9 @@ def test_a_sheet_has_a_picture_for_each_shape():
     assert [ax.get_xlabel() for ax in figure.axes[2:]] == ["a", "b"]
     with pytest.raises(ValueError, match="expected as many"):
         sheet({"cloud": [CORNERS], "answer": []})
+    with pytest.raises(ValueError, match="expected as many, 1 or more"):
+        sheet({"cloud": []})
+    assert len(sheet({"cloud": [CORNERS.clone().requires_grad_()]}).axes) == 1
 
 
 def test_curves_and_bars_show_what_they_are_given():
@@ -109,6 +112,15 @@ def test_the_table_has_the_measured_rows(tmp_path):
         rivals(tmp_path / "none.json")
 
 
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"rows": {}}', '{"rows": {"ucsg": 3}}', '{"rows": {"ucsg": {}}}']
+)
+def test_a_damaged_result_is_told(tmp_path, text):
+    (tmp_path / "r.json").write_text(text)
+    with pytest.raises(ValueError, match="r.json: found no rows as they are measured; .*measure_stump_net"):
+        rivals(tmp_path / "r.json")
+
+
 def test_a_slider_moves_a_number():
     widget = StumpSliders(TWO, CORNERS)
     assert list(widget.numbers)[:3] == ["half x", "half y", "half z"] and widget.chosen == 0
@@ -121,6 +133,13 @@ def test_a_slider_moves_a_number():
     assert list(widget.numbers)[0] == "radius" and widget.numbers["radius"] == pytest.approx(0.15)
     widget.reset()
     assert widget.stump == TWO.to(torch.float32) and "StumpSliders" in repr(widget)
+
+
+def test_numbers_that_make_no_primitive_move_nothing():
+    widget = StumpSliders(TWO, CORNERS)
+    with pytest.raises(ProgramError, match="rotation of primitive 1"):
+        widget.set("rotation w", 0.0)
+    assert widget._sliders["rotation w"].value == 1 and widget.stump == TWO.to(torch.float32)
 
 
 def test_the_menu_chooses_and_the_picture_follows():

@@ -24,7 +24,8 @@ def cover(inside: Bool[Tensor, "c m"], share: float = SHARE) -> Int[Tensor, " ke
     """
     if not 0 <= share <= 1:
         raise ValueError(f"found a share of {share}; expected 0 to 1")
-    wanted, held, kept = math.ceil(share * int(inside.any(0).sum())), torch.zeros_like(inside[0]), []
+    by_any = inside.any(0)
+    wanted, held, kept = math.ceil(share * int(by_any.sum())), torch.zeros_like(by_any), []
     while held.sum() < wanted:
         kept.append(int((inside & ~held).sum(1).argmax()))
         held |= inside[kept[-1]]
@@ -33,7 +34,12 @@ def cover(inside: Bool[Tensor, "c m"], share: float = SHARE) -> Int[Tensor, " ke
 
 @torch.no_grad()
 def simplified(said: SoftStump, points: Float[Tensor, "b m 3"], share: float = SHARE) -> SoftStump:
-    """The same answers with only those nodes united that `cover` keeps, told by these points."""
+    """The same answers with only those nodes united that `cover` keeps, told by these points.
+
+    Raises ValueError for points that are not finite, and for a share that is not from 0 to 1.
+    """
+    if not points.isfinite().all():
+        raise ValueError("found points that are not finite; expected numbers")
     union = torch.full_like(said.union, -torch.inf)
     for row, distances in enumerate(said.distances(points)):
         w_c, w_i, w_u = (logits[row] > 0 for logits in said.logits)

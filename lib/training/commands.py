@@ -26,7 +26,7 @@ from torch import nn
 from ..datasets import REPOSITORY, DataError
 from ..interpreters.shapeassembly import ProgramError
 from ..models.weights import CheckpointError, save
-from .loop import CHECKPOINT, Schedule, Task, TrainingError, fit, write_whole
+from .loop import CHECKPOINT, LARGEST_SEED, Schedule, Task, TrainingError, fit, write_whole
 
 PROGRAM = "python -m lib.training"
 TOLD = ("loss", "reward", "val_loss", "val_cd", "val_iou")  # of the figures of an epoch, if it has them
@@ -129,6 +129,8 @@ def _parser(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
 def _train(command: Command, options: argparse.Namespace, folder: Path, line: str) -> None:
     if not 1 <= options.threads <= MOST_THREADS:
         raise TrainingError(f"threads is {options.threads}; expected 1 to {MOST_THREADS}")
+    if not 0 <= options.seed <= LARGEST_SEED:  # before networks are made with it
+        raise TrainingError(f"seed is {options.seed}; expected 0 to {LARGEST_SEED}")
     torch.set_num_threads(options.threads)
     fabric = fabric_of_this_run(options.precision)
     job = command.job(options)

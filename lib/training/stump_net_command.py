@@ -49,8 +49,8 @@ def job(options: argparse.Namespace) -> Job:
     try:
         lesson = _lesson(options)
         student = StumpStudent(StumpNet(_config(options)), lesson)
-    except ValueError as error:
-        raise TrainingError(str(error)) from error
+    except (ValueError, TypeError, RuntimeError) as error:  # the others for more weights than memory
+        raise TrainingError(str(error).splitlines()[0]) from error
     return solids_command.solid_job(options, train, student, lesson)
 
 

@@ -59,12 +59,13 @@ def sheet(
 ) -> Figure:
     """Shapes in columns, a named row for each way to see them: meshes, or clouds (n, 3) as points.
 
-    titles  under each column. All of a column are seen by one camera. Raises ValueError for rows of unequal lengths.
+    titles  under each column. All of a column are seen by one camera. Raises ValueError for rows of unequal lengths,
+    and for none.
     """
     counts = {len(row) for row in rows.values()}
-    if len(counts) != 1 or titles is not None and {len(titles)} != counts:
+    if len(counts) != 1 or counts == {0} or titles is not None and {len(titles)} != counts:
         raise ValueError(
-            f"found rows of {sorted(counts)} shapes and {titles and len(titles)} titles; expected as many"
+            f"found rows of {sorted(counts)} shapes and {titles and len(titles)} titles; expected as many, 1 or more"
         )
     columns = counts.pop()
     figure, axes = plt.subplots(
@@ -84,7 +85,7 @@ def sheet(
 
 
 def _drawable(thing) -> np.ndarray | trimesh.Trimesh:
-    return thing.double().numpy() if isinstance(thing, Tensor) else thing
+    return thing.detach().double().numpy() if isinstance(thing, Tensor) else thing
 
 
 def _draw(ax, thing, camera: Camera, dot: float) -> None:
@@ -185,10 +186,17 @@ def use_figure(used: Mapping[str, Float[np.ndarray, "shapes n"]]) -> Figure:
 
 
 def rivals(path: Path = RESULT, rows: str = "rows") -> dict[str, dict]:
-    """The measured rows, CSG-Stump Net first. Raises FileNotFoundError, which names the command, if there are none."""
+    """The measured rows, CSG-Stump Net first. Raises FileNotFoundError, which names the command, if there are none, and
+    ValueError for a file that is damaged."""
     if not path.is_file():
         raise FileNotFoundError(f"results/stump_net/{path.name} is not there; this measures it: {COMMAND}")
-    found = json.loads(path.read_text(encoding="utf-8"))[rows]
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))[rows]
+        whole = bool(found) and all({"chamfer_mean", "iou"} <= row.keys() for row in found.values())
+    except (ValueError, LookupError, TypeError, AttributeError):
+        whole = False
+    if not whole:
+        raise ValueError(f"{path}: found no {rows} as they are measured; make them again: {COMMAND}")
     order = [*NAMES, *sorted(found.keys() - NAMES.keys())]
     return {NAMES.get(name, name): found[name] for name in order if name in found}
 

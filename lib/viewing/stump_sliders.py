@@ -17,7 +17,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from torch import Tensor
 
-from lib.interpreters.stump import Stump, layers
+from lib.interpreters.stump import ProgramError, Stump, layers
 from lib.models.reconstructing import surface
 from lib.viewing.figure import show
 from lib.viewing.stump_net_figures import plain
@@ -72,7 +72,10 @@ class StumpSliders(widgets.VBox):
         self._draw()
 
     def set(self, name: str, value: float) -> None:
-        """Move one number of the chosen primitive. Raises KeyError for a name that it does not have."""
+        """Move one number of the chosen primitive. Raises KeyError for a name that it does not have.
+
+        Raises ProgramError where the numbers make no primitive, such as a rotation of zeros; nothing is moved then.
+        """
         self._sliders[name].value = value
 
     def reset(self) -> None:
@@ -112,8 +115,12 @@ class StumpSliders(widgets.VBox):
     def _moved(self) -> None:
         primitives, old = list(self.stump.primitives), self.stump.primitives[self.chosen]
         numbers = torch.tensor([slider.value for slider in self._sliders.values()])
-        primitives[self.chosen] = old.with_numbers(numbers)
-        self.stump = Stump(primitives, *self.stump.matrices)
+        try:
+            primitives[self.chosen] = old.with_numbers(numbers)
+            self.stump = Stump(primitives, *self.stump.matrices)
+        except ProgramError:
+            self.choose(self.chosen)  # the sliders as they were
+            raise
         self._draw()
 
     def _draw(self) -> None:

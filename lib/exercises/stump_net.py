@@ -35,7 +35,7 @@ def check_reach(answer: object) -> str:
 
 
 def check_low_rank(answer: object) -> str:
-    """Exercise 12.2: a function of p (K, d), n (C, d) and g (d,) that returns the logits (K, C)."""
+    """Exercise 12.3: a function of p (K, d), n (C, d) and g (d,) that returns the logits (K, C)."""
     if answer is None:
         return UNANSWERED
     generator = torch.Generator().manual_seed(0)
@@ -56,7 +56,7 @@ def check_low_rank(answer: object) -> str:
 
 
 def check_pull(answer: object) -> str:
-    """Exercise 12.3: distances of one primitive to some points; the paper's term is 0, the authors' is not."""
+    """Exercise 12.2: distances of one primitive to some points; the paper's term is 0, the authors' is not."""
     if answer is None:
         return UNANSWERED
     try:

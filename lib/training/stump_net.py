@@ -3,7 +3,7 @@
     L = mean over points of (T - inside)^2  +  0.001 * mean over primitives of min over points of SDF^2
 
 The second term pulls every primitive's surface to the nearest test point, so that those far away get a gradient. The
-authors' program squares the minimum instead, which pulls only primitives that contain no point ("authors").
+authors' program squares the minimum instead ("authors"), which also shrinks primitives until no point is deep inside.
 
 Connections begin soft, W = sigmoid(logit). In the second half of a training the sigmoid gets steeper, so that in the
 end little is left to be decided when W becomes 0 or 1. In the first half surfaces get sharper, from `dullest` to the

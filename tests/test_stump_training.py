@@ -212,6 +212,8 @@ def test_the_papers_settings(tmp_path):
         (["--nodes", "0"], "TrainingError: found StumpNetConfig(primitives=8, nodes=0"),
         (["--dullest", "151"], "TrainingError: found dullest 151; expected more than 0, at most 150"),
         (["--steepest", "0.5"], "TrainingError: found 16 points, 32 queries, weight 0.001, steepest 0.5"),
+        (["--steepest", "nan"], "TrainingError: found 16 points, 32 queries, weight 0.001, steepest nan"),
+        (["--weight", "inf"], "TrainingError: found 16 points, 32 queries, weight inf"),
         (["--queries", "1"], "TrainingError: found 16 points, 1 queries"),
         (["--power", "-1"], "TrainingError: found a power of -1"),
         (["--power", "0", "--temperature", "999"], "TrainingError: found a temperature of 999"),

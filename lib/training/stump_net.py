@@ -10,6 +10,7 @@ end little is left to be decided when W becomes 0 or 1. In the first half surfac
 paper's 150: a dull surface is seen by more points, which can pull at it.
 """
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -49,10 +50,11 @@ class Lesson:
     def __post_init__(self) -> None:
         if self.pull not in PULLS:
             raise ValueError(f"found the pull {self.pull!r}; expected one of {', '.join(PULLS)}")
-        if self.points < 1 or self.queries < 2 or self.weight < 0 or self.steepest < 1:
+        enough = self.points >= 1 and self.queries >= 2
+        if not (enough and 0 <= self.weight < math.inf and 1 <= self.steepest < math.inf):
             raise ValueError(
                 f"found {self.points} points, {self.queries} queries, weight {self.weight}, steepest {self.steepest}; "
-                "expected at least 1, 2, 0 and 1"
+                "expected at least 1, 2, 0 and 1, and finite"
             )
         if not 0 < self.dullest <= SHARPNESS:
             raise ValueError(f"found dullest {self.dullest:g}; expected more than 0, at most {SHARPNESS:g}")

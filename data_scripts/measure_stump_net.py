@@ -133,7 +133,7 @@ def on_surface(mesh: trimesh.Trimesh, seed: int) -> Tensor:
 
 
 def row(name: str, answer: Callable[[SolidSet, int], Answer], clouds: SolidSet) -> dict:
-    """The means over all clouds, and Chamfer distance and IoU over those of each source."""
+    """The means over all clouds, and Chamfer distance and IoU over those of each category."""
     bar = tqdm(range(len(clouds)), desc=name, leave=False, disable=None)
     rows = [figures(answer, clouds, number) for number in bar]
     found = {key: mean([each[key] for each in rows]) for key in rows[0]}

@@ -11,6 +11,7 @@ from lib.interpreters.openscad import read
 from lib.interpreters.stump import Box, ProgramError, Sphere, parse
 from lib.models.reconstructing import surface
 from lib.models.soft_stump import SoftStump
+from lib.viewing.stump_choices import choices, choices_figure, choices_table
 from lib.viewing.stump_net_figures import (
     gap_figure,
     owners,
@@ -119,6 +120,24 @@ def test_a_damaged_result_is_told(tmp_path, text):
     (tmp_path / "r.json").write_text(text)
     with pytest.raises(ValueError, match="r.json: found no rows as they are measured; .*measure_stump_net"):
         rivals(tmp_path / "r.json")
+
+
+def test_each_choice_has_a_line_and_each_seed_a_dot(tmp_path):
+    runs = [{"soft_iou": 61.0, "decided_iou": 60.0}, {"soft_iou": 63.0, "decided_iou": 60.0}]
+    row = {"runs": runs, "soft": 62.0, "decided": 60.0, "lost": 3.2258, "weights": 1234567}
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps({"rows": {"default": row, "no ground": row | {"lost": 4.0}}}))
+    lines = choices_table(path).splitlines()
+    assert lines[1].split() == ["default", "62.0", "60.0", "3.2", "1,234,567"]
+    assert lines[2].split()[:5] == ["no", "ground", "62.0", "60.0", "4.0"]
+    (ax,) = choices_figure(path).axes
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["default", "no ground"]
+    assert [list(line.get_xdata()) for line in ax.lines] == [[61, 63], [60, 60]] * 2
+    path.write_text(json.dumps({"rows": {"default": {"runs": runs}}}))
+    with pytest.raises(ValueError, match="a.json: found no rows .*ablate_stump_net"):
+        choices(path)
+    with pytest.raises(FileNotFoundError, match="ablate_stump_net"):
+        choices(tmp_path / "none.json")
 
 
 def test_a_slider_moves_a_number():

@@ -31,7 +31,7 @@ LARGEST = 1 << 28  # bytes of a file
 MOST = 1 << 20  # points that can be asked for
 SMALL, BIG = 1e-30, 1e30  # the networks' single precision can hold what lies between
 FEWEST_SAMPLED = 100  # of a mesh, however few are asked for
-GERMAN = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")  # a number with a decimal comma, or a whole one
+WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")  # a number with a decimal comma, or a whole one
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def _table(path: Path) -> tuple[np.ndarray, list[str]]:
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split("#")[0].replace(";", " ").split()
-        if len(words) < 3 or not all(map(GERMAN.fullmatch, words[:3])):
+        if len(words) < 3 or not all(map(WITH_COMMA.fullmatch, words[:3])):
             words = " ".join(words).replace(",", " ").split()
         try:
             row = [float(word.replace(",", ".")) for word in words[:3]]

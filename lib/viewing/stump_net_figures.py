@@ -10,7 +10,6 @@ rivals_table(), rivals_figure()                               what results/stump
 Coordinates are the clouds' own, y up, as furniture has it.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from lib.interpreters.stump import layers
 from lib.models.soft_stump import SoftStump
 from lib.viewing.camera import Camera
 from lib.viewing.figure import bounds_of, draw, draw_points
+from lib.viewing.measured_rows import measured_rows
 from lib.viewing.stump_solids import COLORS
 
 RESULT = Path(__file__).parents[2] / "results" / "stump_net" / "reconstruction.json"
@@ -186,17 +186,8 @@ def use_figure(used: Mapping[str, Float[np.ndarray, "shapes n"]]) -> Figure:
 
 
 def rivals(path: Path = RESULT, rows: str = "rows") -> dict[str, dict]:
-    """The measured rows, CSG-Stump Net first. Raises FileNotFoundError, which names the command, if there are none, and
-    ValueError for a file that is damaged."""
-    if not path.is_file():
-        raise FileNotFoundError(f"results/stump_net/{path.name} is not there; this measures it: {COMMAND}")
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))[rows]
-        whole = bool(found) and all({"chamfer_mean", "iou"} <= row.keys() for row in found.values())
-    except (ValueError, LookupError, TypeError, AttributeError):
-        whole = False
-    if not whole:
-        raise ValueError(f"{path}: found no {rows} as they are measured; make them again: {COMMAND}")
+    """The measured rows, CSG-Stump Net first; see `measured_rows` for what is raised."""
+    found = measured_rows(path, rows, {"chamfer_mean", "iou"}, COMMAND)
     order = [*NAMES, *sorted(found.keys() - NAMES.keys())]
     return {NAMES.get(name, name): found[name] for name in order if name in found}
 

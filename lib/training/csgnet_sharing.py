@@ -30,7 +30,9 @@ class Shared(nn.Module):
 def share(network: CSGNet) -> None:
     """Let the network's tokens share weights; what it computes is the same at first."""
     numbers = numbers_of(vocabulary_of(network.config.dimensions))
-    parametrize.register_parametrization(network.scores, "weight", Shared(numbers, network.config.hidden))
+    parametrize.register_parametrization(
+        network.scores, "weight", Shared(numbers, network.scores.in_features)
+    )
     with_start = torch.cat([numbers, numbers.new_zeros(1, numbers.shape[1])])
     parametrize.register_parametrization(
         network.embedding, "weight", Shared(with_start, network.config.embedding)

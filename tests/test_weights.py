@@ -176,3 +176,24 @@ def test_weights_that_are_not_finite_are_refused(network, path, value):
     save(network, path)
     with pytest.raises(CheckpointError, match="not finite in 'layer.bias'; expected finite ones"):
         load(Tiny, path)
+
+
+def test_half_of_the_digits_and_half_of_the_bytes(network, path, tmp_path):
+    """float16 has 11 binary digits: a weight comes back with a relative error below 2^-11, as float32."""
+    with torch.no_grad():
+        network.layer.weight.copy_(torch.rand_like(network.layer.weight) + 0.5)
+    save(network, tmp_path / "half.safetensors", half=True)
+    found = load(Tiny, tmp_path / "half.safetensors").layer.weight
+    assert found.dtype == torch.float32
+    error = (found / network.layer.weight - 1).abs()
+    assert 0 < error.max() < 2**-11
+    stored = read(tmp_path / "half.safetensors", "Tiny")[0]
+    assert stored["layer.weight"].dtype == torch.float16
+    assert stored["norm.num_batches_tracked"].dtype == torch.int64  # a count stays what it is
+
+
+def test_weights_too_large_for_half_the_digits(network, tmp_path):
+    network.layer.bias.data[0] = 70000.0
+    with pytest.raises(CheckpointError, match="found 70000 in 'layer.bias'; expected at most 65504"):
+        save(network, tmp_path / "half.safetensors", half=True)
+    assert not list(tmp_path.glob("*half*"))

@@ -1,6 +1,7 @@
 """A trained network as one file: weights as plain arrays (safetensors), its config as JSON in the header.
 
     save(network, path)                 network.config is a frozen dataclass of numbers, texts and tuples of these
+    save(network, path, half=True)      with 11 binary digits a weight instead of 24: a file half as large
     load(Network, path) -> network      Network(config) builds it
 
 The header's only entry, "shape_programs", is the JSON {"kind": class name, "config": fields, "sha256": of the arrays}:
@@ -28,10 +29,25 @@ class CheckpointError(RuntimeError):
     """A file that does not hold what was asked for: missing, damaged, foreign, or of another network."""
 
 
-def save(network: nn.Module, path: Path) -> None:
-    """Write the weights and `network.config`. A killed run never leaves half a file under the real name."""
-    config = dataclasses.asdict(network.config)
-    write(path, network.state_dict(), type(network).__name__, {"config": config})
+def save(network: nn.Module, path: Path, half: bool = False) -> None:
+    """Write the weights and `network.config`. A killed run never leaves half a file under the real name.
+
+    half  write float32 weights as float16. Raises CheckpointError for weights beyond its largest number, 65504.
+    """
+    config, tensors = dataclasses.asdict(network.config), network.state_dict()
+    if half:
+        tensors = {name: _halved(name, tensor) for name, tensor in tensors.items()}
+    write(path, tensors, type(network).__name__, {"config": config})
+
+
+def _halved(name: str, tensor: Tensor) -> Tensor:
+    if tensor.dtype != torch.float32:
+        return tensor
+    if not (halved := tensor.half()).isfinite().all():
+        raise CheckpointError(
+            f"found {tensor.abs().max():g} in {name!r}; expected at most 65504, to keep as float16"
+        )
+    return halved
 
 
 def load(network: type[Network], path: Path, device: torch.device | str = "cpu") -> Network:
@@ -41,6 +57,9 @@ def load(network: type[Network], path: Path, device: torch.device | str = "cpu")
     weights that are not finite.
     """
     tensors, facts = read(path, network.__name__)
+    tensors = {
+        name: tensor.float() if tensor.dtype == torch.float16 else tensor for name, tensor in tensors.items()
+    }
     if wrong := [name for name, tensor in tensors.items() if not tensor.isfinite().all()]:
         raise CheckpointError(
             f"{path}: found numbers that are not finite in {wrong[0]!r}; expected finite ones"

@@ -120,6 +120,9 @@ def _parser(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         one.add_argument("--out", type=Path, help="folder of the run (default: below runs/)")
         one.add_argument("--threads", type=int, default=1, help="CPU threads a process (default 1)")
         one.add_argument(
+            "--half", action="store_true", help="keep the trained weights as float16: a file half as large"
+        )
+        one.add_argument(
             "--precision", choices=PRECISIONS, default=PRECISIONS[0],
             help="of numbers: bf16-mixed is twice as fast where the processor has it (default 32-true)",
         )  # fmt: skip
@@ -146,7 +149,7 @@ def _train(command: Command, options: argparse.Namespace, folder: Path, line: st
     if fabric.is_global_zero:
         path = folder / f"{options.name}.safetensors"
         job.ready()
-        save(job.network, path)
+        save(job.network, path, options.half)
         job.finish(path)
         facts = _facts(job, log, fabric, line, options.precision)
         write_whole(path.with_suffix(".json"), json.dumps(facts, indent=2) + "\n")

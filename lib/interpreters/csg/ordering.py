@@ -1,12 +1,14 @@
-"""One of the many programs that say the same: operands of unions and intersections in a fixed order.
+"""One of the many programs that say the same: operands in a fixed order, and what is cut away comes last.
 
-    A + B = B + A,  (A + B) + C = A + (B + C), and the same for intersections; nothing is moved across a subtraction
+    A + B = B + A,  (A + B) + C = A + (B + C),  and the same for intersections
+    A - (B + C) = A - B - C = A - C - B,        (A - B) * C = A * (C - B) = A * C - B
 
-What is united (or intersected) in a row is sorted, longer parts first, then by tokens, and joined from left to right.
+What is united in a row is sorted, longer parts first, then by tokens, and joined from left to right. So is what is
+intersected in a row, from which then everything that any of them lost is subtracted, one after the other, sorted too.
 The picture stays the same, to the bit, and so does the length.
 """
 
-from collections.abc import Iterable
+from dataclasses import dataclass
 
 import torch
 from jaxtyping import Int
@@ -15,9 +17,34 @@ from torch import Tensor
 from .errors import ProgramError
 from .vocabulary import Vocabulary
 
-Part = tuple[
-    int | None, tuple[tuple[int, ...], ...]
-]  # the operation that joins them or None, and the parts' tokens
+Tokens = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a program: the union of `kept`; or, if it is `cut`, their intersection, less each of `removed`."""
+
+    kept: tuple[Tokens, ...]
+    removed: tuple[Tokens, ...] = ()
+    cut: bool = False
+
+    def written(self, union: int) -> Tokens:
+        """Its tokens, where `union` is the token + and the next ones are * and -."""
+        first, *others = _sorted(self.kept)
+        joined = [*first, *(token for each in others for token in (*each, union + self.cut))]
+        return (*joined, *(token for each in _sorted(self.removed) for token in (*each, union + 2)))
+
+    def united(self, union: int) -> tuple[Tokens, ...]:
+        """It is the union of these."""
+        return (self.written(union),) if self.cut else self.kept
+
+    def intersected(self, union: int) -> tuple[Tokens, ...]:
+        """It is the intersection of these, less those that are removed."""
+        return self.kept if self.cut else (self.written(union),)
+
+
+def _sorted(parts: tuple[Tokens, ...]) -> list[Tokens]:
+    return sorted(parts, key=lambda tokens: (-len(tokens), tokens))
 
 
 def ordered(tokens: Int[Tensor, "programs length"], vocabulary: Vocabulary) -> Int[Tensor, "programs length"]:
@@ -46,27 +73,23 @@ def _ordered(tokens: list[int], union: int) -> list[int]:
         if not 0 <= token < union + 3:
             raise ValueError(f"'{token}' is not a token")
         if token < union:
-            stack.append((None, ((token,),)))
+            stack.append(Part(((token,),)))
             continue
         if len(stack) < 2:
             raise ValueError("an operation finds no two shapes")
         right, left = stack.pop(), stack.pop()
-        if token == union + 2:
-            stack.append((None, ((*_joined(left), *_joined(right), token),)))
-        else:
-            stack.append((token, (*_operands(left, token), *_operands(right, token))))
+        stack.append(_combined(left, right, token - union, union))
     if len(stack) > 1:
         raise ValueError(f"it ends with {len(stack)} shapes")
-    written = _joined(stack[0]) if stack else ()
+    written = stack[0].written(union) if stack else ()
     return [*written, *tokens[len(written) :]]
 
 
-def _operands(part: Part, operation: int) -> Iterable[tuple[int, ...]]:
-    """What a part unites if it is a union and joins a larger one; else the part itself."""
-    return part[1] if part[0] == operation else (_joined(part),)
-
-
-def _joined(part: Part) -> tuple[int, ...]:
-    operation, operands = part
-    first, *others = sorted(operands, key=lambda tokens: (-len(tokens), tokens))
-    return first + tuple(token for each in others for token in (*each, operation))
+def _combined(left: Part, right: Part, operation: int, union: int) -> Part:
+    """Two parts joined by + (0), * (1) or - (2)."""
+    if operation == 0:
+        return Part(left.united(union) + right.united(union))
+    kept = left.intersected(union)
+    if operation == 1:
+        return Part(kept + right.intersected(union), left.removed + right.removed, cut=True)
+    return Part(kept, left.removed + right.united(union), cut=True)

@@ -19,11 +19,10 @@ killed run leaves no half file behind.
 import argparse
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 from data_scripts import mask_files, sweethome
-from data_scripts.ending import default_root, exit_code
 from data_scripts.made_files import is_made, replaces
+from data_scripts.making import command
 from data_scripts.mask_files import Drawn
 from data_scripts.shape_sources import Item, Source, draw_all, furniture, models, programs
 from lib.datasets import IMAGE_SOURCES, DataError
@@ -31,10 +30,6 @@ from lib.datasets.images import read, views_of
 from lib.interpreters.rasterising import VIEWS, box_triangles, silhouettes
 from lib.interpreters.shapeassembly import ProgramError, execute_many
 
-OUT = (
-    "default: %(default)s; lib.datasets looks for a folder silhouettes/ in data/, or in the folder that the "
-    "environment variable SHAPE_PROGRAMS_DATA names"
-)
 CODE = (  # what, changed, draws other masks
     "lib/interpreters/cuboids.py",
     "lib/interpreters/rasterising.py",
@@ -101,38 +96,10 @@ def make_one(name: str, options: argparse.Namespace) -> str:
     return line
 
 
-def make_all(options: argparse.Namespace) -> None:
-    """Make the sources that the options name, a line for each. Raises DataError."""
-    for name in dict.fromkeys(options.source or IMAGE_SOURCES):
-        print(make_one(name, options))
-
-
 def main(arguments: list[str] | None = None) -> int:
-    """The command; returns the exit code: 0 made, 1 a problem, 130 interrupted. Problems are one line on stderr."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--source", action="append", choices=IMAGE_SOURCES, help="only this (may be repeated; default: all)"
-    )
-    parser.add_argument(
-        "--count", type=int, default=1000, help="furniture of each category (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--package", type=Path, help="use this .deb of sweethome3d-furniture, download nothing"
-    )
-    parser.add_argument("--out", type=Path, default=default_root() / "silhouettes", help=OUT)
-    parser.add_argument("--force", action="store_true", help="replace masks that were made of something else")
-    parser.add_argument("--workers", type=int, default=-1, help="processes (default: one for each core)")
-    parser.add_argument("--sheet", action="store_true", help="write contact sheets, too")
-    options = parser.parse_args(arguments)
-    if options.workers < 1 and options.workers != -1:
-        parser.error("--workers must be 1 or more")
-    if options.count < 1:
-        parser.error("--count must be 1 or more")
-    return exit_code(
-        lambda: make_all(options), "interrupted; what was finished stays, the same command makes the rest"
-    )
+    """The command; see data_scripts.making for options and exit code."""
+    counted = "furniture of each category"
+    return command(__doc__, IMAGE_SOURCES, "silhouettes", counted, make_one, arguments, sheets=True)
 
 
 if __name__ == "__main__":

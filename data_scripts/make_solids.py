@@ -30,9 +30,9 @@ import numpy as np
 import trimesh
 
 from data_scripts import sweethome
-from data_scripts.ending import default_root, exit_code
 from data_scripts.journal import check_place
 from data_scripts.made_files import code_of, is_made, replaces, write_made
+from data_scripts.making import command
 from data_scripts.shape_sources import MIT, Item, Source, draw_all, furniture, models, programs
 from lib.datasets import DataError
 from lib.datasets.images import SHARES, SPLITS, split_of
@@ -43,10 +43,6 @@ from lib.interpreters.shapeassembly import ProgramError, execute_many
 from lib.interpreters.stump import execute, sample
 
 POINTS, QUERIES = 2048, 4096  # of each solid
-OUT = (
-    "default: %(default)s; lib.datasets looks for a folder solids/ in data/, or in the folder that the environment "
-    "variable SHAPE_PROGRAMS_DATA names"
-)
 CODE = (  # what, changed, makes other clouds
     "lib/datasets/solid_*.py",
     "lib/furniture/*.py",
@@ -169,35 +165,10 @@ def make_one(name: str, options: argparse.Namespace) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command; returns the exit code: 0 made, 1 a problem, 130 interrupted. Problems are one line on stderr."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    """The command; see data_scripts.making for options and exit code."""
+    return command(
+        __doc__, SOURCES, "solids", "furniture of each category, random solids", make_one, arguments
     )
-    parser.add_argument(
-        "--source", action="append", choices=SOURCES, help="only this (may be repeated; default: all)"
-    )
-    parser.add_argument(
-        "--count", type=int, default=1000, help="furniture of each category, random solids (%(default)s)"
-    )
-    parser.add_argument(
-        "--package", type=Path, help="use this .deb of sweethome3d-furniture, download nothing"
-    )
-    parser.add_argument("--out", type=Path, default=default_root() / "solids", help=OUT)
-    parser.add_argument(
-        "--force", action="store_true", help="replace clouds that were made of something else"
-    )
-    parser.add_argument("--workers", type=int, default=-1, help="processes (default: one for each core)")
-    options = parser.parse_args(arguments)
-    if options.workers < 1 and options.workers != -1:
-        parser.error("--workers must be 1 or more")
-    if options.count < 1:
-        parser.error("--count must be 1 or more")
-
-    def work() -> None:
-        for name in dict.fromkeys(options.source or SOURCES):
-            print(make_one(name, options))
-
-    return exit_code(work, "interrupted; what was finished stays, the same command makes the rest")
 
 
 if __name__ == "__main__":

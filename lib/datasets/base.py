@@ -77,3 +77,12 @@ def choose(what: str, value: str | None, choices: tuple[str, ...]) -> tuple[str,
     if value not in choices:
         raise DataError(f"unknown {what} {value!r}: choose one of {', '.join(choices)}, or None for all")
     return (value,)
+
+
+def made_sources(source: str | None, known: tuple[str, ...], folder: Path) -> Sequence[str]:
+    """The source that is asked for; for None those whose .npz is in the folder, or "embedded" where none is. Raises
+    DataError for one that is neither known nor "embedded"."""
+    sources = choose("source", source, (*known, "embedded"))
+    if source is not None:
+        return sources
+    return [name for name in known if (folder / f"{name}.npz").exists()] or ["embedded"]

@@ -21,7 +21,7 @@ from lib.furniture import make
 from lib.interpreters import rasterising
 from lib.interpreters.rasterising import FILL, SIZE, VIEWS, box_triangles
 
-from .base import CATEGORIES, DataError, choose, data_root, read_arrays
+from .base import CATEGORIES, DataError, choose, data_root, made_sources, read_arrays
 
 SPLITS = ("train", "val", "test")
 SOURCES = ("shapeassembly", "furniture", "sweethome3d")  # what data_scripts.make_silhouettes knows
@@ -97,12 +97,9 @@ def silhouettes(source: str | None = None, split: str | None = None) -> ImageSet
     split   "train", "val", "test", or None for all: no shape and no mask is in two of them.
     Raises DataError for another source or split, one that was not made, and files that are damaged.
     """
-    sources = choose("source", source, (*SOURCES, "embedded"))
     choose("split", split, SPLITS)
     folder = data_root() / "silhouettes"
-    if source is None:
-        sources = [name for name in SOURCES if (folder / f"{name}.npz").exists()] or ["embedded"]
-    images = joined([_images(folder, name) for name in sources])
+    images = joined([_images(folder, name) for name in made_sources(source, SOURCES, folder)])
     return images if split is None else images.select(split)
 
 

@@ -20,7 +20,7 @@ from lib.furniture import make
 from lib.interpreters.cuboids import Cuboids
 from lib.interpreters.stump import Stump, execute
 
-from .base import CATEGORIES, DataError, choose, data_root, read_arrays
+from .base import CATEGORIES, DataError, choose, data_root, made_sources, read_arrays
 from .images import SPLITS, split_of
 from .solid_sampling import Contains, SolidSample, by_winding, sample_solid
 from .solids import SOLIDS, solid
@@ -89,12 +89,9 @@ def solid_clouds(source: str | None = None, split: str | None = None) -> SolidSe
     split   "train", "val", "test", or None for all
     Raises DataError for another source or split, one that was not made, and files that are damaged.
     """
-    sources = choose("source", source, (*SOURCES, "embedded"))
     choose("split", split, SPLITS)
     folder = data_root() / "solids"
-    if source is None:
-        sources = [name for name in SOURCES if (folder / f"{name}.npz").exists()] or ["embedded"]
-    clouds = joined([_clouds(folder, name) for name in sources])
+    clouds = joined([_clouds(folder, name) for name in made_sources(source, SOURCES, folder)])
     return clouds if split is None else clouds.select(split)
 
 

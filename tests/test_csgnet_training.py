@@ -420,6 +420,20 @@ def test_a_run_goes_on_with_its_own_settings_only(small, tmp_path, capsys, optio
     assert error.startswith("CheckpointError: ") and told in error and error.count("\n") == 1
 
 
+def test_half_of_the_digits_are_kept_of_the_same_weights(small, tmp_path):
+    """--half says how weights are kept, not how they are learned: a finished run only writes them anew."""
+    assert train(*FEW, "--out", tmp_path) == 0
+    path = tmp_path / "csgnet.safetensors"
+    whole, size = load(CSGNet, path).state_dict(), path.stat().st_size
+    assert train(*FEW, "--half", "--out", tmp_path) == 0
+    halved = load(CSGNet, path).state_dict()
+    assert path.stat().st_size < 0.6 * size and "--half" in (tmp_path / "csgnet.json").read_text()
+    for name, tensor in halved.items():
+        assert tensor.dtype == whole[name].dtype
+        assert torch.allclose(tensor, whole[name], rtol=2**-11, atol=1e-6), name
+    assert any(not torch.equal(tensor, whole[name]) for name, tensor in halved.items())
+
+
 # ---- processes ----
 
 

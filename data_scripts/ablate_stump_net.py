@@ -1,6 +1,6 @@
 """What each choice in CSG-Stump Net's training is worth:   python -m data_scripts.ablate_stump_net
 
-Trains the compact network on chairs, once for each choice and seed, two passes over 3,339 clouds each, and scores it on
+Trains the compact network on chairs, once for each choice and seed, two passes over 2,560 clouds each, and scores it on
 validation clouds. Each choice differs from the default in one thing. Writes results/stump_net/ablation.json; a row has
 
     options     what was said to `python -m lib.training stump_net`, beside what all were told

@@ -76,7 +76,9 @@ def version(*parts: str) -> dict[str, str]:
 
 
 def rounded(found):
-    """Numbers with four digits after the point, also inside of rows."""
+    """Numbers with four digits after the point, also inside of rows and lists."""
+    if isinstance(found, list):
+        return [rounded(value) for value in found]
     if isinstance(found, dict):
         return {name: rounded(value) for name, value in found.items()}
     return round(found, 4) if isinstance(found, float) else found

@@ -48,7 +48,7 @@ def choices_figure(path: Path = RESULT) -> Figure:
     ax.invert_yaxis()
     ax.set_xlabel("IoU of the test points, %")
     ax.grid(axis="x", alpha=0.3)
-    ax.legend(fontsize=8)
+    ax.legend(fontsize=8, loc="lower left")
     ax.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
     return figure

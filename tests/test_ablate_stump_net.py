@@ -13,7 +13,7 @@ CHOICES = {"default": "", "boxes only": "--kinds box"}
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory):
-    """The folder of a quick ablation of two choices and two seeds, and what it wrote."""
+    """The folder of a quick ablation of two choices and one seed, and what it wrote."""
     folder = tmp_path_factory.mktemp("ablation")
     with pytest.MonkeyPatch.context() as patch, unchecked():
         patch.setattr(ablate_stump_net, "CHOICES", CHOICES)

@@ -45,7 +45,7 @@ class ParseTask:
 
     per_epoch   programs an epoch
     curriculum  share of all steps in which the longest programs that are shown grow from the shortest to all of them
-    in_order    teach programs with the operands of unions and intersections in a fixed order, not as they are
+    in_order    of the ways to say a program teach one, see interpreters.csg.ordering; not as they are
     about       JSON: data and settings that must be the same when a run goes on
     """
 

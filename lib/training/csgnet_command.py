@@ -31,7 +31,11 @@ SETTINGS = (
         "curriculum", float, 0.0, 0.0, "share of the steps in which the longest programs grow to all lengths"
     ),
     Setting(
-        "in_order", int, 1, 0, "1: operands of unions and intersections in a fixed order; 0: as they are"
+        "in_order",
+        int,
+        1,
+        0,
+        "1: of the ways to say a program one, see interpreters.csg.ordering; 0: as they are",
     ),
     Setting(
         "sharing", int, 1, 0, "1: while it learns, tokens with a number in common share weights; 0: none do"

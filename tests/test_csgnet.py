@@ -76,7 +76,7 @@ def test_the_feature_is_as_wide_as_announced(make, width, dimensions):
 def test_compact_weights_fit_into_twelve_megabytes(dimensions):
     with torch.device("meta"):
         network = CSGNet(CSGNetConfig.compact(dimensions))
-    of_a_number = 4 if dimensions == 2 else 2  # those of space are kept with --half
+    of_a_number = 2  # they are kept with --half
     assert sum(of_a_number * prod(weight.shape) for weight in network.state_dict().values()) < 12e6
 
 

@@ -59,7 +59,7 @@ def tiny(config: CSGNetConfig = TINY, seed: int = 0) -> CSGNet:
 
 
 def task_of(train: TokenSet, other: TokenSet | None = None, network: CSGNet | None = None, **changes):
-    options = {"per_epoch": 40, "curriculum": 0.0, "in_order": False, "about": {}} | changes
+    options = {"per_epoch": 40, "curriculum": 0.0, "pruned": False, "in_order": False, "about": {}} | changes
     return ParseTask(Teacher(network or tiny()), train, other or train, **options)
 
 
@@ -251,7 +251,7 @@ def test_stopped_anywhere_it_ends_with_the_same_bits(tmp_path, stop, dropout):
     """Also the running statistics of the encoder's norm, and also where dropout draws random numbers."""
     config, train = replace(TINY, dropout=dropout), programs(1, 3, 5)
     schedule = Schedule(epochs=3, batch=8, rate=0.01, warmup=0.2, clip=1.0, seed=3)
-    settings = {"per_epoch": 24, "curriculum": 0.5, "in_order": True}
+    settings = {"per_epoch": 24, "curriculum": 0.5, "pruned": True, "in_order": True}
     whole, resumed = (task_of(train, network=tiny(config), **settings) for _ in range(2))
     torch.manual_seed(stop)
     fit(whole, schedule, tmp_path / "whole")
@@ -317,7 +317,7 @@ def test_what_is_saved_has_the_networks_own_weights(small, tmp_path, sharing):
     network = load(CSGNet, tmp_path / "csgnet.safetensors")
     assert set(network.state_dict()) == set(tiny().state_dict())
     found = json.loads((tmp_path / "csgnet.json").read_text())["losses"]["val_loss"]
-    loss = task_of(programs(1), csg_programs(2, "val"), network, in_order=True).report(Teacher(network))
+    loss = task_of(programs(1), csg_programs(2, "val"), network, pruned=True, in_order=True).report(Teacher(network))
     assert loss["val_loss"] == pytest.approx(found, rel=1e-5)  # what is loaded is what was measured
 
 

@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from ..datasets.csg import TokenSet
 from ..interpreters.csg import execute_many
 from ..interpreters.csg.ordering import ordered
+from ..interpreters.csg.pruning import pruned
 from ..metrics.images import image_chamfer, iou
 from ..models.csgnet import CSGNet
 from ..models.csgnet_decoding import write
@@ -45,7 +46,8 @@ class ParseTask:
 
     per_epoch   programs an epoch
     curriculum  share of all steps in which the longest programs that are shown grow from the shortest to all of them
-    in_order    of the ways to say a program teach one, see interpreters.csg.ordering; not as they are
+    pruned      teach programs without parts that their pictures do not need, see interpreters.csg.pruning
+    in_order    of the ways to say a program teach one, see interpreters.csg.ordering
     about       JSON: data and settings that must be the same when a run goes on
     """
 
@@ -54,6 +56,7 @@ class ParseTask:
     other: TokenSet
     per_epoch: int
     curriculum: float
+    pruned: bool
     in_order: bool
     about: dict
     drawing: float = field(default=0.0, init=False)  # seconds since the last report
@@ -75,7 +78,7 @@ class ParseTask:
     ) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of as many random programs as there are picks."""
         tokens = self.train.tokens[torch.randint(self.shown(progress), (len(picks),), generator=noise)]
-        tokens = self.taught(tokens[:, : int((tokens != self.train.vocabulary.stop).sum(1).max()) + 1])
+        tokens = self.taught(tokens)
         start = time.perf_counter()
         device = next(network.parameters()).device
         canvases = drawn(tokens, self.train, device)
@@ -83,8 +86,12 @@ class ParseTask:
         return network(canvases, tokens.to(device)), {}
 
     def taught(self, tokens: Int[Tensor, "rows length"]) -> Int[Tensor, "rows length"]:
-        """The programs as the network is to write them."""
-        return ordered(tokens, self.train.vocabulary) if self.in_order else tokens
+        """The programs as the network is to write them, with one `$` after the longest."""
+        if self.pruned:
+            tokens = pruned(tokens, self.train.vocabulary)
+        if self.in_order:
+            tokens = ordered(tokens, self.train.vocabulary)
+        return tokens[:, : int((tokens != self.train.vocabulary.stop).sum(1).max()) + 1]
 
     def shown(self, progress: float) -> int:
         """How many of the programs, the shortest first, are drawn from when a share `progress` of all steps is done."""

@@ -31,6 +31,13 @@ SETTINGS = (
         "curriculum", float, 0.0, 0.0, "share of the steps in which the longest programs grow to all lengths"
     ),
     Setting(
+        "pruned",
+        int,
+        1,
+        0,
+        "1: parts of a program that do not change its picture are not taught; 0: they are",
+    ),
+    Setting(
         "in_order",
         int,
         1,
@@ -66,7 +73,7 @@ def job(options: argparse.Namespace) -> Job:
             f"curriculum is {options.curriculum}, programs {options.programs}; "
             f"expected a share from 0 to 1, and 1 to {MOST}"
         )
-    for name in ("in_order", "sharing"):
+    for name in ("pruned", "in_order", "sharing"):
         if (value := getattr(options, name)) not in (0, 1):
             raise TrainingError(f"{name} is {value}; expected 0 or 1")
     names = ("epochs", "batch", "rate", "warmup", "last", "clip", "seed")
@@ -84,7 +91,7 @@ def job(options: argparse.Namespace) -> Job:
     about = {
         "dimensions": options.dimensions, "data": digest(programs), "network": asdict(network.config),
         "start": begun, "programs": options.programs, "curriculum": options.curriculum,
-        "in_order": options.in_order, "sharing": options.sharing, "precision": options.precision,
+        "pruned": options.pruned, "in_order": options.in_order, "sharing": options.sharing, "precision": options.precision,
     }  # fmt: skip
     task = ParseTask(
         Teacher(network),
@@ -92,6 +99,7 @@ def job(options: argparse.Namespace) -> Job:
         others,
         options.programs,
         options.curriculum,
+        bool(options.pruned),
         bool(options.in_order),
         about,
     )

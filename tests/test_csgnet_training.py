@@ -136,13 +136,31 @@ def test_batches_follow_the_curriculum(monkeypatch):
 def test_programs_in_order_draw_the_same():
     train = csg_programs(2, "val")
     plain, ordered = (task_of(train, in_order=each) for each in (False, True))
-    assert torch.equal(plain.taught(train.tokens), train.tokens)
+    assert torch.equal(plain.taught(train.tokens), train.tokens)  # the longest are there, so no column is cut
     taught = ordered.taught(train.tokens)
     assert (taught != train.tokens).any(1).float().mean() > 0.2  # something was to be done
     assert torch.equal(execute_many(taught).words, execute_many(train.tokens).words)
     first = len(PLANE.primitives)  # of the operations only their number stays: A - (B + C) becomes A - B - C
     assert torch.equal(*(tokens.clamp(max=first).sort(1).values for tokens in (taught, train.tokens)))
     assert torch.equal(ordered.taught(taught), taught)
+
+
+def test_what_no_picture_needs_is_not_taught():
+    train = csg_programs(2, "val")
+    taught = task_of(train, pruned=True).taught(train.tokens)
+    both = task_of(train, pruned=True, in_order=True).taught(train.tokens)
+    was, now, also = ((each != PLANE.stop).sum(1) for each in (train.tokens, taught, both))
+    assert (now < was).float().mean() > 0.4 and torch.equal(now, also)
+    for tokens in (taught, both):
+        assert torch.equal(execute_many(tokens).words, execute_many(train.tokens).words)
+    assert torch.equal(both, task_of(train, in_order=True).taught(taught))
+
+
+def test_taught_programs_are_as_wide_as_the_longest():
+    hidden = parse("c(16,16,8)c(16,16,12)+").tokens(PLANE, 6)[None]
+    for pruned, width in ((False, 4), (True, 2)):
+        train = TokenSet(hidden, PLANE, "made", "")
+        assert task_of(train, pruned=pruned).taught(hidden).shape == (1, width)
 
 
 def test_loss_and_report_use_the_order():
@@ -297,8 +315,8 @@ def test_the_command_leaves_weights_and_facts(small, tmp_path, capsys):
     assert facts["weights"] == sum(weight.numel() for weight in network.parameters())
     settings = facts["settings"]
     assert settings["network"]["hidden"] == 16 and settings["momentum"] == 0
-    assert {name: settings[name] for name in ("dimensions", "programs", "in_order", "precision")} == {
-        "dimensions": 2, "programs": 12, "in_order": 1, "precision": "32-true",
+    assert {name: settings[name] for name in ("dimensions", "programs", "pruned", "in_order", "precision")} == {
+        "dimensions": 2, "programs": 12, "pruned": 1, "in_order": 1, "precision": "32-true",
     }  # fmt: skip
     assert facts["epochs"] == 2 and 0 < facts["losses"]["val_loss"] < 20
     assert facts["command"].startswith("python -m lib.training csgnet --epochs 2")
@@ -317,7 +335,9 @@ def test_what_is_saved_has_the_networks_own_weights(small, tmp_path, sharing):
     network = load(CSGNet, tmp_path / "csgnet.safetensors")
     assert set(network.state_dict()) == set(tiny().state_dict())
     found = json.loads((tmp_path / "csgnet.json").read_text())["losses"]["val_loss"]
-    loss = task_of(programs(1), csg_programs(2, "val"), network, pruned=True, in_order=True).report(Teacher(network))
+    loss = task_of(programs(1), csg_programs(2, "val"), network, pruned=True, in_order=True).report(
+        Teacher(network)
+    )
     assert loss["val_loss"] == pytest.approx(found, rel=1e-5)  # what is loaded is what was measured
 
 
@@ -348,7 +368,7 @@ def test_a_start_of_the_other_dimension_is_told(small, tmp_path, capsys):
 def test_the_papers_settings(small, tmp_path):
     assert train("--paper", *FEW, "--epochs", 1, "--out", tmp_path) == 0
     settings = json.loads((tmp_path / "csgnet.json").read_text())["settings"]
-    expected = {"rate": 1e-3, "warmup": 0, "clip": 10, "in_order": 0, "curriculum": 0}
+    expected = {"rate": 1e-3, "warmup": 0, "clip": 10, "pruned": 0, "in_order": 0, "curriculum": 0}
     assert {name: settings[name] for name in expected} == expected
 
 
@@ -367,6 +387,7 @@ def test_the_seed_decides_and_nothing_else(small, tmp_path):
         (["--programs", "0"], "TrainingError: curriculum is 0.0, programs 0; expected"),
         (["--curriculum", "1.5"], "TrainingError: curriculum is 1.5"),
         (["--curriculum", "nan"], "TrainingError: curriculum is nan"),
+        (["--pruned", "-1"], "TrainingError: pruned is -1; expected 0 or 1"),
         (["--in_order", "2"], "TrainingError: in_order is 2; expected 0 or 1"),
         (["--sharing", "-1"], "TrainingError: sharing is -1; expected 0 or 1"),
         (["--batch", "0"], "TrainingError: batch is 0"),
@@ -406,6 +427,7 @@ def test_half_precision_is_another_run(small, tmp_path, capsys):
 @pytest.mark.parametrize(
     "option, told",
     [
+        (["--pruned", "0"], "pruned: 1 then, 0 now"),
         (["--in_order", "0"], "in_order: 1 then, 0 now"),
         (["--sharing", "0"], "sharing: 1 then, 0 now"),
         (["--curriculum", "0.5"], "curriculum: 0.0 then, 0.5 now"),

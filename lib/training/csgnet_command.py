@@ -91,7 +91,8 @@ def job(options: argparse.Namespace) -> Job:
     about = {
         "dimensions": options.dimensions, "data": digest(programs), "network": asdict(network.config),
         "start": begun, "programs": options.programs, "curriculum": options.curriculum,
-        "pruned": options.pruned, "in_order": options.in_order, "sharing": options.sharing, "precision": options.precision,
+        "pruned": options.pruned, "in_order": options.in_order, "sharing": options.sharing,
+        "precision": options.precision,
     }  # fmt: skip
     task = ParseTask(
         Teacher(network),

@@ -229,6 +229,11 @@ def test_tables_show_what_was_measured(tmp_path):
     assert lines[6].split()[-2:] == ["1.39", "0.50"]
     assert "5,000 test programs, nearest of 1,225,000 known ones" in lines[-1]
     assert csgnet_paper.RESULTS == measure_csgnet.FOLDER
+    (tmp_path / csgnet_paper.SECOND).mkdir()
+    found["rows"]["k=10"]["chamfer_px"] = 0.625
+    (tmp_path / csgnet_paper.SECOND / "synthetic_2d.json").write_text(json.dumps(found))
+    *same, last = csgnet_paper.table(2, tmp_path).splitlines()
+    assert same == lines and last == "(with a second seed: k=10 0.62)"  # remembering has no seed
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"rows": [1]}', '{"rows": {"k=1": 3}}'])

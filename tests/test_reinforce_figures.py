@@ -10,6 +10,7 @@ from PIL import Image
 
 from lib.interpreters.csg import execute_many, parse
 from lib.training.bandit import estimate, exact_gradient, learn, pull, spread
+from lib.viewing.csgnet_paper import SECOND
 from lib.viewing.reinforce_figures import (
     answers_figure,
     estimate_figure,
@@ -20,7 +21,7 @@ from lib.viewing.reinforce_figures import (
     spread_figure,
     tuning_figure,
 )
-from lib.viewing.reinforce_results import PAPER, long_runs, table_3
+from lib.viewing.reinforce_results import PAPER, TAUGHT, long_runs, table_3
 
 REWARDS = (0.3, 1.7)
 THETA = torch.linspace(-3, 3, 13, dtype=torch.float64)
@@ -114,16 +115,22 @@ def test_a_film_has_a_frame_for_each_moment():
 
 
 def test_saved_results_are_shown_or_missed(tmp_path):
-    assert long_runs(tmp_path) is None and "measure_csgnet silhouettes" in table_3(tmp_path)
+    assert long_runs(folder=tmp_path) is None and "measure_csgnet silhouettes" in table_3(tmp_path)
     runs = [{"name": "from scratch", "log": []}]
     (tmp_path / "reinforce_curves.json").write_text(json.dumps({"runs": runs}))
-    assert long_runs(tmp_path) == runs
+    assert long_runs(folder=tmp_path) == runs and long_runs(TAUGHT, tmp_path) is None
     ours = {n: 2.5 for n in ("0", "1", "2", "4", "10", "None")}
     found = {"samples": 16, "data": "embedded", "rows": {name: {"chamfer_px": ours} for name in PAPER}}
     (tmp_path / "silhouettes.json").write_text(json.dumps(found))
     lines = table_3(tmp_path).splitlines()
     assert len(lines) == 2 + 2 * len(PAPER) and len({len(line) for line in lines[1:]}) == 1
     assert lines[-1].split() == ["paper", "1.14", "0.50", "0.44", "0.42", "0.42", "0.41"]
+    (tmp_path / SECOND).mkdir()
+    (tmp_path / SECOND / "silhouettes.json").write_text(json.dumps(found).replace("2.5", "2.75"))
+    lines = table_3(tmp_path).splitlines()
+    assert len(lines) == 2 + 3 * len(PAPER) - 1  # remembering has no seed
+    assert lines[-2].split() == ["seed", "1", *["2.75"] * 6] and lines[-3].split()[-1] == "2.50"
+    (tmp_path / SECOND / "silhouettes.json").unlink()
     powell = {"same_as_powell_px": ours, "powell_px": ours, "seconds_each": 0.1, "powell_seconds_each": 2.0}
     found["rows"]["reinforced k=10"] |= powell
     (tmp_path / "silhouettes.json").write_text(json.dumps(found | {"powell_samples": 9}))

@@ -1,14 +1,17 @@
-"""What longer runs of CSGNet without a teacher came to, read from results/csgnet, beside the paper's Table 3.
+"""What longer runs of CSGNet came to, read from results/csgnet, and the paper's Table 3 beside ours.
 
-long_runs()          curves of trainings, or None where they were not kept
+long_runs()          curves of trainings without a teacher, or None where they were not kept
+long_runs(TAUGHT)    of trainings with one, whose programs have parts that nobody sees, or have none
 print(table_3())     the table of results/csgnet/silhouettes.json, or which command makes it
 """
 
 import json
 from pathlib import Path
 
-FOLDER = Path(__file__).parents[2] / "results" / "csgnet"
-CURVES, TABLE = "reinforce_curves.json", "silhouettes.json"
+from .csgnet_paper import RESULTS as FOLDER
+from .csgnet_paper import SECOND
+
+CURVES, TAUGHT, TABLE = "reinforce_curves.json", "teaching_curves.json", "silhouettes.json"
 TRAIN = "python -m lib.training csgnet_reinforce"
 NO_CURVES = (
     f"results/csgnet/{CURVES} is not there yet; these make such curves, in runs/: "
@@ -28,25 +31,34 @@ PAPER = {  # mean Chamfer distance, px, after so many iterations of refinement: 
 }
 
 
-def long_runs(folder: Path = FOLDER) -> list[dict] | None:
+def long_runs(name: str = CURVES, folder: Path = FOLDER) -> list[dict] | None:
     """[{"name": …, "log": one row an epoch}]; None where the file is missing."""
-    path = folder / CURVES
+    path = folder / name
     return json.loads(path.read_text(encoding="utf-8"))["runs"] if path.is_file() else None
 
 
 def table_3(folder: Path = FOLDER) -> str:
-    """Mean Chamfer distances to silhouettes, px, by iterations of refinement: ours, and the paper's below each."""
+    """Mean Chamfer distances to silhouettes, px, by iterations of refinement: ours, with a second seed where that was
+    measured, and the paper's below each."""
     path = folder / TABLE
     if not path.is_file():
         return NO_TABLE
-    found = json.loads(path.read_text(encoding="utf-8"))
+    found, second = (_rows_of(each) for each in (path, folder / SECOND / TABLE))
     lines = [f"{found['samples']} silhouettes ({found['data']})", " " * 24 + _cells(SWEEPS.values())]
     for name, printed in PAPER.items():
         if name in found["rows"]:
             ours = found["rows"][name]["chamfer_px"]
             lines.append(f"{name:16s}{'ours':8s}{_cells(f'{ours[n]:.2f}' for n in SWEEPS)}")
+            if name in second["rows"] and name != "nearest":
+                ours = second["rows"][name]["chamfer_px"]
+                lines.append(f"{'':16s}{'seed 1':8s}{_cells(f'{ours[n]:.2f}' for n in SWEEPS)}")
             lines.append(f"{'':16s}{'paper':8s}{_cells(f'{value:.2f}' for value in printed)}")
     return "\n".join([*lines, *_powell_lines(found)])
+
+
+def _rows_of(path: Path) -> dict:
+    """The file's content; no rows where there is no file."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {"rows": {}}
 
 
 def _powell_lines(found: dict) -> list[str]:

@@ -6,7 +6,7 @@ validation clouds. Each choice differs from the default in one thing. Writes res
     options     what was said to `python -m lib.training stump_net`, beside what all were told
     weights     of the network, how many
     runs        for each seed: IoU of the test points soft and decided (percent), primitives and nodes used, entropy of
-                the connections (bits), seconds
+                the connections (bits), seconds; and the commit of the code that trained it
     soft, decided, lost   means over the seeds, and what deciding loses (percent of the soft IoU); spread: largest
                 less smallest decided IoU of the seeds
 
@@ -64,14 +64,15 @@ def measure(runs: Path, source: str, quick: bool) -> dict:
     rows: dict[str, dict] = {name: {"options": options, "runs": []} for name, options in CHOICES.items()}
     # Every choice with one seed comes before the second seed: a comparison is there early.
     for seed, name in tqdm([*product(seeds, CHOICES)], desc="runs", disable=None):
-        run, weights = trained(runs / f"{name.replace(' ', '-')}-{seed}", CHOICES[name], told, seed)
+        place = runs / ("quick" if quick else "whole")
+        run, weights = trained(place / f"{name.replace(' ', '-')}-{seed}", CHOICES[name], told, seed)
         rows[name]["weights"] = weights
         rows[name]["runs"].append({"seed": seed} | run)
     header = {"data": data.describe(), "all": shlex.join(told), **version(*DECIDING)}
     return rounded(header | {"rows": {name: row | means(row["runs"]) for name, row in rows.items()}})
 
 
-def trained(folder: Path, options: str, told: tuple[str, ...], seed: int) -> tuple[dict[str, float], int]:
+def trained(folder: Path, options: str, told: tuple[str, ...], seed: int) -> tuple[dict, int]:
     """Figures at the end of a run, and how many weights its network has. Raises DataError where it could not end,
     and KeyboardInterrupt."""
     command = ["stump_net", *told, *shlex.split(options), "--seed", str(seed), "--out", str(folder)]
@@ -82,10 +83,11 @@ def trained(folder: Path, options: str, told: tuple[str, ...], seed: int) -> tup
         raise DataError(f"{folder}: the training did not end; see above")
     last = json.loads((folder / LOG).read_text(encoding="utf-8").splitlines()[-1])
     facts = json.loads((folder / "stump_net.json").read_text(encoding="utf-8"))
-    return {name: factor * last[key] for name, (key, factor) in FIGURES.items()}, facts["weights"]
+    figures = {name: factor * last[key] for name, (key, factor) in FIGURES.items()}
+    return figures | {"commit": facts["code"]["commit"]}, facts["weights"]
 
 
-def means(runs: list[dict[str, float]]) -> dict[str, float]:
+def means(runs: list[dict]) -> dict[str, float]:
     """Over the seeds."""
     soft, decided = ([run[f"{name}_iou"] for run in runs] for name in ("soft", "decided"))
     lost = 100 * (1 - sum(decided) / sum(soft)) if sum(soft) else 0.0

@@ -27,18 +27,25 @@ def curve(named: str) -> dict:
     if not (name and equals and path.is_file()):
         raise DataError(f"found {named!r}; expected NAME=FOLDER, and a {LOG} in the folder")
     try:
-        log = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        lines = path.read_text(encoding="utf-8").splitlines()
+        log = [json.loads(line, parse_constant=_no_number) for line in lines]
         if [row["epoch"] for row in log] != list(range(1, len(log) + 1)) or not log:
             raise ValueError("its log has no rows of epochs 1, 2, …")
-        return {"name": name, **_command(Path(folder)), "log": log}
-    except (ValueError, TypeError, KeyError) as error:
+        return {"name": name, **_command(Path(folder), len(log)), "log": log}
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise DataError(f"{folder}: a file in it is damaged, or of no run ({error})") from error
 
 
-def _command(folder: Path) -> dict[str, str]:
-    """The command, from the facts beside the run's weights; nothing where it has not ended."""
-    facts = [path for path in folder.glob("*.json") if path.with_suffix(".safetensors").is_file()]
-    return {"command": json.loads(facts[0].read_text(encoding="utf-8"))["command"]} if facts else {}
+def _no_number(found: str) -> None:
+    raise ValueError(f"{found} is no number")
+
+
+def _command(folder: Path, epochs: int) -> dict[str, str]:
+    """The command, from the facts beside the run's weights; nothing where it has not ended, or where they are those of
+    an earlier run, with another number of epochs."""
+    paths = [path for path in folder.glob("*.json") if path.with_suffix(".safetensors").is_file()]
+    facts = json.loads(paths[0].read_text(encoding="utf-8")) if paths else {"epochs": None}
+    return {"command": str(facts["command"])} if facts["epochs"] == epochs else {}
 
 
 def main(arguments: list[str] | None = None) -> int:

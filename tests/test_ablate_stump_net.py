@@ -31,24 +31,25 @@ def test_rows_are_what_the_runs_logged(quick):
     assert list(found["rows"]) == list(CHOICES) and "embedded" in found["data"]
     for name, row in found["rows"].items():
         (run,) = row["runs"]
-        place = folder / "runs" / f"{name.replace(' ', '-')}-0"
+        place = folder / "runs" / "quick" / f"{name.replace(' ', '-')}-0"
         logged = json.loads((place / "log.jsonl").read_text())
         assert run["seed"] == 0 and run["decided_iou"] == pytest.approx(100 * logged["val_iou"], abs=1e-4)
-        assert row["weights"] == json.loads((place / "stump_net.json").read_text())["weights"]
+        facts = json.loads((place / "stump_net.json").read_text())
+        assert row["weights"] == facts["weights"] and run["commit"] == facts["code"]["commit"]
 
 
 def test_a_choice_changes_what_is_trained(quick):
     folder, found = quick
     default, boxes = found["rows"].values()
     assert default["decided"] != boxes["decided"]
-    facts = json.loads((folder / "runs" / "boxes-only-0" / "stump_net.json").read_text())
+    facts = json.loads((folder / "runs" / "quick" / "boxes-only-0" / "stump_net.json").read_text())
     assert facts["settings"]["network"]["kinds"] == ["box"]
 
 
 def test_finished_runs_are_not_trained_again(quick, monkeypatch, tmp_path):
     folder, found = quick
     monkeypatch.setattr(ablate_stump_net, "CHOICES", CHOICES)
-    before = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/checkpoint.safetensors")}
+    before = {path: path.stat().st_mtime_ns for path in folder.glob("runs/quick/*/checkpoint.safetensors")}
     assert main(folder, "--out", str(tmp_path / "again.json")) == 0
     again = json.loads((tmp_path / "again.json").read_text())
     assert again["rows"] == found["rows"]

@@ -89,8 +89,31 @@ def test_what_is_no_program_stays():
     given = tokens.clone()
     assert pruned(tokens, PLANE).tolist() == [[0, *[PLANE.stop] * 3], *tokens.tolist()[1:]]
     assert torch.equal(tokens, given)  # what is given is not changed
-    assert pruned(tokens[:0], PLANE).shape == (0, 4)
+    assert pruned(tokens[:0], PLANE).shape == (0, 4) and pruned(tokens[:, :0], PLANE).shape == (3, 0)
     with pytest.raises(ProgramError, match="'401' is not a token"):
         pruned(torch.tensor([[401]]), PLANE)
-    with unchecked(), pytest.raises(ProgramError, match="whole numbers"):
-        pruned(torch.zeros(2, 3), PLANE)
+    for bad in (torch.zeros(2, 3), tokens[0]):
+        with unchecked(), pytest.raises(ProgramError, match="whole numbers"):
+            pruned(bad, PLANE)
+
+
+def test_what_comes_after_the_end_is_no_part_of_the_program():
+    a, far, inner, outer = (PLANE.index(text) for text in (A, FAR, IN_B, B))
+    union, cut, stop = PLANE.index("+"), PLANE.index("*"), PLANE.stop
+    blank = [
+        a,
+        far,
+        cut,
+        stop,
+        union,
+        a,
+        a,
+    ]  # draws nothing: as what is behind its end, without the end, would
+    needed, hidden = [a, stop, inner, outer, union], [inner, outer, union, stop, union]
+    for row, expected in ((blank, blank), (needed, needed), (hidden, [outer, *[stop] * 4])):
+        assert pruned(torch.tensor([row]), PLANE).tolist() == [expected]
+
+
+@pytest.mark.parametrize("kind", [torch.int8, torch.int16, torch.int32])
+def test_small_whole_numbers_are_tokens_too(kind):
+    assert pruned(torch.tensor([[7], [9]], dtype=kind), PLANE).tolist() == [[7], [9]]

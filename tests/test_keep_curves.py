@@ -14,7 +14,9 @@ def run(tmp_path):
     folder.mkdir()
     rows = [{"epoch": 1, "reward": 0.25}, {"epoch": 2, "reward": 0.5}]
     (folder / "log.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    (folder / "csgnet_reinforce.json").write_text(json.dumps({"command": "python -m lib.training x"}))
+    (folder / "csgnet_reinforce.json").write_text(
+        json.dumps({"command": "python -m lib.training x", "epochs": 2})
+    )
     (folder / "csgnet_reinforce.safetensors").write_bytes(b"")
     (folder / "a_notes.json").write_text("[]")  # not the run's
     return folder
@@ -36,6 +38,15 @@ def test_a_run_that_goes_on_has_no_command_yet(run, tmp_path):
     assert set(json.loads(out.read_text())["runs"][0]) == {"name", "log"}
 
 
+def test_facts_of_an_earlier_run_are_not_of_this_one(run, tmp_path):
+    with (run / "log.jsonl").open("a") as log:
+        log.write('{"epoch": 3, "reward": 0.75}\n')
+    out = tmp_path / "curves.json"
+    assert main([f"a={run}", "--out", str(out)]) == 0
+    kept = json.loads(out.read_text())["runs"][0]
+    assert set(kept) == {"name", "log"} and len(kept["log"]) == 3
+
+
 @pytest.mark.parametrize("named", ["run", "=run", "name=", "name=nowhere"])
 def test_what_is_no_run(named, tmp_path, capsys):
     out = tmp_path / "curves.json"
@@ -44,7 +55,17 @@ def test_what_is_no_run(named, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "log", ["{half", "", "5\n", "[1]\n", '{"reward": 1}\n', '{"epoch": 2}\n{"epoch": 1}\n']
+    "log",
+    [
+        "{half",
+        "",
+        "5\n",
+        "[1]\n",
+        "[" * 100_000,
+        '{"reward": 1}\n',
+        '{"epoch": 2}\n{"epoch": 1}\n',
+        '{"epoch": NaN}\n',
+    ],
 )
 def test_a_damaged_log(run, tmp_path, capsys, log):
     (run / "log.jsonl").write_text(log)

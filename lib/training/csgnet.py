@@ -47,7 +47,8 @@ class ParseTask:
     per_epoch   programs an epoch
     curriculum  share of all steps in which the longest programs that are shown grow from the shortest to all of them
     pruned      teach programs without parts that their pictures do not need, see interpreters.csg.pruning
-    in_order    of the ways to say a program teach one, see interpreters.csg.ordering
+    in_order    then, of the ways to say a program teach one, see interpreters.csg.ordering. It may make a part needless
+                again, such as C's in A * C - B for (A - B) * C: so it is in 5 of 100 random programs of the plane
     about       JSON: data and settings that must be the same when a run goes on
     """
 
@@ -78,8 +79,8 @@ class ParseTask:
     ) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of as many random programs as there are picks."""
         tokens = self.train.tokens[torch.randint(self.shown(progress), (len(picks),), generator=noise)]
-        tokens = self.taught(tokens)
         start = time.perf_counter()
+        tokens = self.taught(tokens)
         device = next(network.parameters()).device
         canvases = drawn(tokens, self.train, device)
         self.drawing += time.perf_counter() - start

@@ -47,7 +47,7 @@ def execute_many(
         raise ProgramError("found a str", expected="a sequence of Programs, see parse(text)")
     if isinstance(programs, Tensor):
         vocabulary = vocabulary or vocabulary_of(dimensions or 2)
-        tokens = _checked(programs, vocabulary)
+        tokens = checked(programs, vocabulary)
     else:
         tokens, vocabulary = _spell(list(programs), vocabulary, dimensions)
     device = tokens.device if device is None else torch.device(device)
@@ -56,7 +56,7 @@ def execute_many(
     return Shapes(words, valid, tokens, vocabulary)
 
 
-def _checked(tokens: Tensor, vocabulary: Vocabulary) -> Int[Tensor, "programs length"]:
+def checked(tokens: Tensor, vocabulary: Vocabulary) -> Int[Tensor, "programs length"]:
     """The tokens as int64. Raises ProgramError, naming row and place, for what cannot be tokens."""
     if tokens.ndim != 2 or tokens.is_floating_point() or tokens.is_complex() or tokens.dtype == torch.bool:
         found = f"the tokens are a tensor {tuple(tokens.shape)} of {tokens.dtype}"

@@ -11,22 +11,22 @@ import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
 
-from .executing import execute_many
+from .executing import checked, execute_many
 from .vocabulary import Vocabulary
 
 _WORKSPACE = 1 << 20  # words of pictures that are compared in one go
 
 
 def pruned(tokens: Int[Tensor, "programs length"], vocabulary: Vocabulary) -> Int[Tensor, "programs length"]:
-    """Programs, padded with `$`, with nothing in them that their pictures do not need.
+    """Programs, padded with `$`, with nothing in them that their pictures do not need, as int64.
 
     Of parts that can be left out the longest goes first. Rows that are no programs stay as they are. Raises
-    ProgramError for numbers that are no tokens.
+    ProgramError for numbers that are no tokens. Takes long for hundreds of parts: all are tried, one after the other.
     """
-    tokens = tokens.clone()
+    tokens = checked(tokens, vocabulary).clone()
     words = vocabulary.canvases().shape[1] * max(1, tokens.shape[1])
     for some in torch.arange(len(tokens), device=tokens.device).split(max(1, _WORKSPACE // words)):
-        while len(some):
+        while tokens[some].numel():
             shorter, changed = _shorter(tokens[some], vocabulary)
             some = some[changed]
             tokens[some] = shorter[changed]
@@ -38,7 +38,8 @@ def _shorter(
 ) -> tuple[Int[Tensor, "n length"], Bool[Tensor, " n"]]:
     """Each program without the longest part that it does not need, and which programs have one."""
     shapes = execute_many(tokens, vocabulary)
-    tried = torch.where(shapes.valid.unsqueeze(1), tokens, vocabulary.stop)
+    ended = (tokens == vocabulary.stop).cummax(1).values
+    tried = torch.where(shapes.valid.unsqueeze(1) & ~ended, tokens, vocabulary.stop)
     program, dropped = _omissions(tried, vocabulary)
     kept = torch.where(dropped, vocabulary.stop, tried[program])
     kept = kept.gather(1, dropped.byte().argsort(dim=1, stable=True))  # what is dropped goes to the end
@@ -57,8 +58,11 @@ def _omissions(
     """Every way to put an operand in its operation's place: of which program, and which tokens go."""
     places = torch.arange(tokens.shape[1], device=tokens.device)
     operates = (tokens >= len(vocabulary.primitives)) & (tokens < vocabulary.stop)
-    depth = torch.where(operates, -1, (tokens < vocabulary.stop).long()).cumsum(1)
-    before = depth - torch.where(operates, -1, (tokens < vocabulary.stop).long())
+    change = torch.where(
+        operates, -1, (tokens < vocabulary.stop).long()
+    )  # of the number of pictures on the stack
+    depth = change.cumsum(1)
+    before = depth - change
     # A part that ends at i begins at the last place j up to i where the stack was one lower before it.
     begins = (before.unsqueeze(1) == depth.unsqueeze(2) - 1) & (places <= places.unsqueeze(1))
     begin = torch.where(begins, places, 0).amax(2)

@@ -8,8 +8,8 @@ print(table_3())     the table of results/csgnet/silhouettes.json, or which comm
 import json
 from pathlib import Path
 
-from .csgnet_paper import RESULTS as FOLDER
-from .csgnet_paper import SECOND
+from lib.viewing.csgnet_paper import RESULTS as FOLDER
+from lib.viewing.csgnet_paper import SECOND
 
 CURVES, TAUGHT, TABLE = "reinforce_curves.json", "teaching_curves.json", "silhouettes.json"
 TRAIN = "python -m lib.training csgnet_reinforce"

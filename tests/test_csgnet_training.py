@@ -156,6 +156,19 @@ def test_what_no_picture_needs_is_not_taught():
     assert torch.equal(both, task_of(train, in_order=True).taught(taught))
 
 
+def test_jitter_changes_pictures_that_are_learned_from_only():
+    train, seen = programs(3), []
+    network = lambda canvases, tokens: seen.append(canvases) or torch.zeros(())  # noqa: E731
+    for jitter in (0.0, 1.0):
+        task = task_of(train, jitter=jitter)
+        network.parameters = task.module.parameters
+        task.loss(network, range(40), noise(), 1.0)
+        seen.append(task.report(task.module.eval()))
+    plain, reported, moved, also_reported = seen
+    assert plain.shape == moved.shape and (plain != moved).any((1, 2)).float().mean() > 0.9
+    assert reported["val_loss"] == also_reported["val_loss"] and reported["val_cd"] == also_reported["val_cd"]
+
+
 def test_taught_programs_are_as_wide_as_the_longest():
     hidden = parse("c(16,16,8)c(16,16,12)+").tokens(PLANE, 6)[None]
     for pruned, width in ((False, 4), (True, 2)):
@@ -269,7 +282,7 @@ def test_stopped_anywhere_it_ends_with_the_same_bits(tmp_path, stop, dropout):
     """Also the running statistics of the encoder's norm, and also where dropout draws random numbers."""
     config, train = replace(TINY, dropout=dropout), programs(1, 3, 5)
     schedule = Schedule(epochs=3, batch=8, rate=0.01, warmup=0.2, clip=1.0, seed=3)
-    settings = {"per_epoch": 24, "curriculum": 0.5, "pruned": True, "in_order": True}
+    settings = {"per_epoch": 24, "curriculum": 0.5, "pruned": True, "in_order": True, "jitter": 0.5}
     whole, resumed = (task_of(train, network=tiny(config), **settings) for _ in range(2))
     torch.manual_seed(stop)
     fit(whole, schedule, tmp_path / "whole")
@@ -387,6 +400,9 @@ def test_the_seed_decides_and_nothing_else(small, tmp_path):
         (["--programs", "0"], "TrainingError: curriculum is 0.0, programs 0; expected"),
         (["--curriculum", "1.5"], "TrainingError: curriculum is 1.5"),
         (["--curriculum", "nan"], "TrainingError: curriculum is nan"),
+        (["--jitter", "1.5"], "TrainingError: jitter is 1.5; expected a share from 0 to 1, in space 0"),
+        (["--jitter", "nan"], "TrainingError: jitter is nan"),
+        (["--dimensions", "3", "--jitter", "0.5"], "TrainingError: jitter is 0.5"),
         (["--pruned", "-1"], "TrainingError: pruned is -1; expected 0 or 1"),
         (["--in_order", "2"], "TrainingError: in_order is 2; expected 0 or 1"),
         (["--sharing", "-1"], "TrainingError: sharing is -1; expected 0 or 1"),
@@ -427,6 +443,7 @@ def test_half_precision_is_another_run(small, tmp_path, capsys):
 @pytest.mark.parametrize(
     "option, told",
     [
+        (["--jitter", "0.5"], "jitter: 0.0 then, 0.5 now"),
         (["--pruned", "0"], "pruned: 1 then, 0 now"),
         (["--in_order", "0"], "in_order: 1 then, 0 now"),
         (["--sharing", "0"], "sharing: 1 then, 0 now"),

@@ -19,6 +19,7 @@ from ..interpreters.csg.pruning import pruned
 from ..metrics.images import image_chamfer, iou
 from ..models.csgnet import CSGNet
 from ..models.csgnet_decoding import write
+from .csgnet_jitter import jittered
 
 PER_REPORT = 100  # programs at once when other data is scored
 
@@ -50,6 +51,7 @@ class ParseTask:
     in_order    then, of the ways to say a program teach one, see interpreters.csg.ordering. It may make a part needless
                 again, such as C's in A * C - B for (A - B) * C: so it is in 5 of 100 random programs of the plane
     about       JSON: data and settings that must be the same when a run goes on
+    jitter      share of the pictures that are moved and stretched a little, see csgnet_jitter; of the plane only
     """
 
     module: Teacher
@@ -60,6 +62,7 @@ class ParseTask:
     pruned: bool
     in_order: bool
     about: dict
+    jitter: float = 0.0
     drawing: float = field(default=0.0, init=False)  # seconds since the last report
     started: float = field(default_factory=time.perf_counter, init=False)
 
@@ -83,6 +86,8 @@ class ParseTask:
         tokens = self.taught(tokens)
         device = next(network.parameters()).device
         canvases = drawn(tokens, self.train, device)
+        if self.jitter:
+            canvases = jittered(canvases, self.jitter, noise)
         self.drawing += time.perf_counter() - start
         return network(canvases, tokens.to(device)), {}
 

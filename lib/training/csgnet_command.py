@@ -31,6 +31,13 @@ SETTINGS = (
         "curriculum", float, 0.0, 0.0, "share of the steps in which the longest programs grow to all lengths"
     ),
     Setting(
+        "jitter",
+        float,
+        0.0,
+        0.0,
+        "share of the pictures of the plane that are moved and stretched a little (authors' program: 1)",
+    ),
+    Setting(
         "pruned",
         int,
         1,
@@ -73,6 +80,8 @@ def job(options: argparse.Namespace) -> Job:
             f"curriculum is {options.curriculum}, programs {options.programs}; "
             f"expected a share from 0 to 1, and 1 to {MOST}"
         )
+    if not 0 <= options.jitter <= (1 if options.dimensions == 2 else 0):
+        raise TrainingError(f"jitter is {options.jitter}; expected a share from 0 to 1, in space 0")
     for name in ("pruned", "in_order", "sharing"):
         if (value := getattr(options, name)) not in (0, 1):
             raise TrainingError(f"{name} is {value}; expected 0 or 1")
@@ -92,7 +101,7 @@ def job(options: argparse.Namespace) -> Job:
         "dimensions": options.dimensions, "data": digest(programs), "network": asdict(network.config),
         "start": begun, "programs": options.programs, "curriculum": options.curriculum,
         "pruned": options.pruned, "in_order": options.in_order, "sharing": options.sharing,
-        "precision": options.precision,
+        "jitter": options.jitter, "precision": options.precision,
     }  # fmt: skip
     task = ParseTask(
         Teacher(network),
@@ -103,6 +112,7 @@ def job(options: argparse.Namespace) -> Job:
         bool(options.pruned),
         bool(options.in_order),
         about,
+        options.jitter,
     )
     ready = partial(unshare, network) if options.sharing else Job.ready
     return Job(task, schedule, network, programs.describe(), ready=ready)

@@ -28,7 +28,7 @@ def test_what_is_changed_is_moved_and_stretched_by_so_much():
         on = found.any(3 - side)
         low, high = on.byte().argmax(1), 63 - on.flip(1).byte().argmax(1)
         # By up to 3 pixels, and as it is stretched about the middle of the canvas, an edge by less than 1 more.
-        assert (low - first).abs().max() == (high - last).abs().max() == 4
+        assert {int((low - first).abs().max()), int((high - last).abs().max())} == {3, 4}
         moved = (low + high).double() / 2 - (first + last) / 2
         assert abs(moved.mean()) < 0.2 and moved.std() == pytest.approx(3 / 3**0.5, abs=0.1)
         assert set((high - low + 1).tolist()) == {29, 30, 31}

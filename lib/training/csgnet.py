@@ -48,8 +48,7 @@ class ParseTask:
     per_epoch   programs an epoch
     curriculum  share of all steps in which the longest programs that are shown grow from the shortest to all of them
     pruned      teach programs without parts that their pictures do not need, see interpreters.csg.pruning
-    in_order    then, of the ways to say a program teach one, see interpreters.csg.ordering. It may make a part needless
-                again, such as C's in A * C - B for (A - B) * C: so it is in 5 of 100 random programs of the plane
+    in_order    of the ways to say a program teach one, see interpreters.csg.ordering
     about       JSON: data and settings that must be the same when a run goes on
     jitter      share of the pictures that are moved and stretched a little, see csgnet_jitter; of the plane only
     """
@@ -93,11 +92,15 @@ class ParseTask:
 
     def taught(self, tokens: Int[Tensor, "rows length"]) -> Int[Tensor, "rows length"]:
         """The programs as the network is to write them, with one `$` after the longest."""
+        words = self.train.vocabulary
         if self.pruned:
-            tokens = pruned(tokens, self.train.vocabulary)
+            tokens = pruned(tokens, words)
         if self.in_order:
-            tokens = ordered(tokens, self.train.vocabulary)
-        return tokens[:, : int((tokens != self.train.vocabulary.stop).sum(1).max()) + 1]
+            tokens = ordered(tokens, words)
+        # The order may make a part needless, as C's in A * C - B for (A - B) * C: of 5 of 100 programs of the plane.
+        while self.pruned and self.in_order and not torch.equal(shorter := pruned(tokens, words), tokens):
+            tokens = ordered(shorter, words)
+        return tokens[:, : int((tokens != words.stop).sum(1).max()) + 1]
 
     def shown(self, progress: float) -> int:
         """How many of the programs, the shortest first, are drawn from when a share `progress` of all steps is done."""

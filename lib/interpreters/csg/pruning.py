@@ -2,8 +2,8 @@
 
     A + B = A  where B lies in A,   A * B = A  where A lies in B,   A - B = A  where they do not meet
 
-and so on with A and B exchanged. What does not matter may also be hidden by a later operation, so nothing is concluded
-from the operands: one operand of an operation is put in the place of the operation, the whole is drawn again, and where
+and for + and * with A and B exchanged. A part may also be hidden by a later operation, so nothing is concluded from the
+operands: one operand of an operation is put in the place of the operation, the whole is drawn again, and where
 the picture is the same the shorter program stays. That is repeated until every part is needed.
 """
 

@@ -24,7 +24,7 @@ from lib.models.weights import load, read, save
 from lib.training import commands
 from lib.training.__main__ import COMMANDS
 from lib.training.checkpoints import KIND
-from lib.training.csgnet import ParseTask, Teacher
+from lib.training.csgnet import Lessons, ParseTask, Teacher
 from lib.training.csgnet_command import evenly, spread
 from lib.training.loop import CHECKPOINT, LOG, Schedule, fit
 from tests.conftest import unchecked
@@ -59,8 +59,8 @@ def tiny(config: CSGNetConfig = TINY, seed: int = 0) -> CSGNet:
 
 
 def task_of(train: TokenSet, other: TokenSet | None = None, network: CSGNet | None = None, **changes):
-    options = {"per_epoch": 40, "curriculum": 0.0, "pruned": False, "in_order": False, "about": {}} | changes
-    return ParseTask(Teacher(network or tiny()), train, other or train, **options)
+    lessons = Lessons(**{"programs": 40, "pruned": False, "in_order": False} | changes)
+    return ParseTask(Teacher(network or tiny()), train, other or train, lessons, {})
 
 
 def noise(seed: int = 0) -> torch.Generator:
@@ -259,7 +259,7 @@ def test_the_share_of_drawing_is_a_share_and_begins_anew(monkeypatch):
 def test_a_few_programs_are_learnt(tmp_path):
     train = programs(1, 3)
     network = tiny(replace(TINY, channels=(16,), embedding=16, hidden=128))
-    task = task_of(train, network=network, per_epoch=320)
+    task = task_of(train, network=network, programs=320)
     log = fit(task, Schedule(epochs=3, batch=16, rate=0.005, last=0.1, clip=1.0), tmp_path)
     # Nothing learnt is ln 400 = 6.0 a token, and each epoch halves what is left.
     losses = [row["val_loss"] for row in log]
@@ -284,11 +284,12 @@ def test_stopped_anywhere_it_ends_with_the_same_bits(tmp_path, stop, dropout):
     """Also the running statistics of the encoder's norm, and also where dropout draws random numbers."""
     config, train = replace(TINY, dropout=dropout), programs(1, 3, 5)
     schedule = Schedule(epochs=3, batch=8, rate=0.01, warmup=0.2, clip=1.0, seed=3)
-    settings = {"per_epoch": 24, "curriculum": 0.5, "pruned": True, "in_order": True, "jitter": 0.5}
-    whole, resumed = (task_of(train, network=tiny(config), **settings) for _ in range(2))
+    lessons = Lessons(24, curriculum=0.5, jitter=0.5)
+    assert lessons.pruned and lessons.in_order
+    whole, resumed = (ParseTask(Teacher(tiny(config)), train, train, lessons, {}) for _ in range(2))
     torch.manual_seed(stop)
     fit(whole, schedule, tmp_path / "whole")
-    stops = Stops(Teacher(tiny(config)), train, train, about={}, **settings)
+    stops = Stops(Teacher(tiny(config)), train, train, lessons, {})
     stops.left = stop
     with pytest.raises(KeyboardInterrupt):
         fit(stops, schedule, tmp_path / "run")

@@ -10,6 +10,7 @@ from PIL import Image
 
 from lib.interpreters.csg import execute_many, parse
 from lib.training.bandit import estimate, exact_gradient, learn, pull, spread
+from lib.viewing.csgnet_curves import TAUGHT, long_runs
 from lib.viewing.csgnet_paper import SECOND
 from lib.viewing.reinforce_figures import (
     answers_figure,
@@ -21,7 +22,7 @@ from lib.viewing.reinforce_figures import (
     spread_figure,
     tuning_figure,
 )
-from lib.viewing.reinforce_results import PAPER, TAUGHT, long_runs, table_3
+from lib.viewing.silhouette_table import PAPER, table_3
 
 REWARDS = (0.3, 1.7)
 THETA = torch.linspace(-3, 3, 13, dtype=torch.float64)

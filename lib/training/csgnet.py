@@ -41,27 +41,36 @@ class Teacher(nn.Module):
         return nn.functional.cross_entropy(scores[~ended], tokens[~ended])
 
 
+@dataclass(frozen=True)
+class Lessons:
+    """What of the programs is taught, and how many.
+
+    programs    an epoch
+    curriculum  share of all steps in which the longest programs that are shown grow from the shortest to all of them
+    pruned      teach programs without parts that their pictures do not need, see interpreters.csg.pruning
+    in_order    of the ways to say a program teach one, see interpreters.csg.ordering
+    jitter      share of the pictures that are moved and stretched a little, see csgnet_jitter; of the plane only
+    """
+
+    programs: int
+    curriculum: float = 0.0
+    pruned: bool = True
+    in_order: bool = True
+    jitter: float = 0.0
+
+
 @dataclass
 class ParseTask:
     """Learn programs of `train`; those of `other` are scored after every epoch. A `Task` for `lib.training.loop.fit`.
 
-    per_epoch   programs an epoch
-    curriculum  share of all steps in which the longest programs that are shown grow from the shortest to all of them
-    pruned      teach programs without parts that their pictures do not need, see interpreters.csg.pruning
-    in_order    of the ways to say a program teach one, see interpreters.csg.ordering
-    about       JSON: data and settings that must be the same when a run goes on
-    jitter      share of the pictures that are moved and stretched a little, see csgnet_jitter; of the plane only
+    about: JSON, data and settings that must be the same when a run goes on
     """
 
     module: Teacher
     train: TokenSet
     other: TokenSet
-    per_epoch: int
-    curriculum: float
-    pruned: bool
-    in_order: bool
+    lessons: Lessons
     about: dict
-    jitter: float = 0.0
     drawing: float = field(default=0.0, init=False)  # seconds since the last report
     started: float = field(default_factory=time.perf_counter, init=False)
 
@@ -74,7 +83,7 @@ class ParseTask:
         return self.module
 
     def __len__(self) -> int:
-        return self.per_epoch
+        return self.lessons.programs
 
     def loss(
         self, network: nn.Module, picks: Sequence[int], noise: torch.Generator, progress: float
@@ -85,29 +94,30 @@ class ParseTask:
         tokens = self.taught(tokens)
         device = next(network.parameters()).device
         canvases = drawn(tokens, self.train, device)
-        if self.jitter:
-            canvases = jittered(canvases, self.jitter, noise)
+        if self.lessons.jitter:
+            canvases = jittered(canvases, self.lessons.jitter, noise)
         self.drawing += time.perf_counter() - start
         return network(canvases, tokens.to(device)), {}
 
     def taught(self, tokens: Int[Tensor, "rows length"]) -> Int[Tensor, "rows length"]:
         """The programs as the network is to write them, with one `$` after the longest."""
-        words = self.train.vocabulary
-        if self.pruned:
+        words, lessons = self.train.vocabulary, self.lessons
+        if lessons.pruned:
             tokens = pruned(tokens, words)
-        if self.in_order:
+        if lessons.in_order:
             tokens = ordered(tokens, words)
         # The order may make a part needless, as C's in A * C - B for (A - B) * C: of 5 of 100 programs of the plane.
-        while self.pruned and self.in_order and not torch.equal(shorter := pruned(tokens, words), tokens):
+        both = lessons.pruned and lessons.in_order
+        while both and not torch.equal(shorter := pruned(tokens, words), tokens):
             tokens = ordered(shorter, words)
         return tokens[:, : int((tokens != words.stop).sum(1).max()) + 1]
 
     def shown(self, progress: float) -> int:
         """How many of the programs, the shortest first, are drawn from when a share `progress` of all steps is done."""
-        if progress >= self.curriculum:
+        if progress >= self.lessons.curriculum:
             return len(self.train)
         lengths = self._lengths.unique()
-        longest = lengths[int(progress / self.curriculum * len(lengths))]
+        longest = lengths[int(progress / self.lessons.curriculum * len(lengths))]
         return int((self._lengths <= longest).sum())
 
     @torch.no_grad()

@@ -15,7 +15,7 @@ from ..datasets.csg import TokenSet, csg_programs
 from ..models.csgnet import CSGNet, CSGNetConfig, check_reader
 from ..models.weights import load
 from .commands import Command, Job, Setting
-from .csgnet import ParseTask, Teacher
+from .csgnet import Lessons, ParseTask, Teacher
 from .csgnet_sharing import share, unshare
 from .loop import Schedule, TrainingError
 
@@ -55,6 +55,7 @@ SETTINGS = (
         "sharing", int, 1, 0, "1: while it learns, tokens with a number in common share weights; 0: none do"
     ),
 )
+LESSONS = ("programs", "curriculum", "pruned", "in_order", "jitter")  # settings: what is taught
 SCRATCH = "scratch"  # where a network begins that has learned nothing
 MOST = 10**8  # programs an epoch
 VALIDATED = 1000  # programs that are scored after every epoch
@@ -97,23 +98,12 @@ def job(options: argparse.Namespace) -> Job:
     network, begun = begin(options, options.dimensions)
     if options.sharing:
         share(network)
-    about = {
+    lessons = {name: getattr(options, name) for name in LESSONS}
+    about = lessons | {
         "dimensions": options.dimensions, "data": digest(programs), "network": asdict(network.config),
-        "start": begun, "programs": options.programs, "curriculum": options.curriculum,
-        "pruned": options.pruned, "in_order": options.in_order, "sharing": options.sharing,
-        "jitter": options.jitter, "precision": options.precision,
+        "start": begun, "sharing": options.sharing, "precision": options.precision,
     }  # fmt: skip
-    task = ParseTask(
-        Teacher(network),
-        programs,
-        others,
-        options.programs,
-        options.curriculum,
-        bool(options.pruned),
-        bool(options.in_order),
-        about,
-        options.jitter,
-    )
+    task = ParseTask(Teacher(network), programs, others, Lessons(**lessons), about)
     ready = partial(unshare, network) if options.sharing else Job.ready
     return Job(task, schedule, network, programs.describe(), ready=ready)
 

@@ -1,7 +1,5 @@
-"""What longer runs of CSGNet came to, read from results/csgnet, and the paper's Table 3 beside ours.
+"""Table 3 of CSGNet's paper, silhouettes, with our own numbers beside it, read from results/csgnet.
 
-long_runs()          curves of trainings without a teacher, or None where they were not kept
-long_runs(TAUGHT)    of trainings with one, whose programs have parts that nobody sees, or have none
 print(table_3())     the table of results/csgnet/silhouettes.json, or which command makes it
 """
 
@@ -11,12 +9,7 @@ from pathlib import Path
 from lib.viewing.csgnet_paper import RESULTS as FOLDER
 from lib.viewing.csgnet_paper import SECOND
 
-CURVES, TAUGHT, TABLE = "reinforce_curves.json", "teaching_curves.json", "silhouettes.json"
-TRAIN = "python -m lib.training csgnet_reinforce"
-NO_CURVES = (
-    f"results/csgnet/{CURVES} is not there yet; these make such curves, in runs/: "
-    f"`{TRAIN}`, and `{TRAIN} --start scratch`"
-)
+TABLE = "silhouettes.json"
 NO_TABLE = (
     f"results/csgnet/{TABLE} is not there yet; this measures it: "
     "python -m data_scripts.measure_csgnet silhouettes"
@@ -29,12 +22,6 @@ PAPER = {  # mean Chamfer distance, px, after so many iterations of refinement: 
     "reinforced k=1": (1.26, 0.61, 0.54, 0.52, 0.51, 0.51),
     "reinforced k=10": (1.14, 0.50, 0.44, 0.42, 0.42, 0.41),
 }
-
-
-def long_runs(name: str = CURVES, folder: Path = FOLDER) -> list[dict] | None:
-    """[{"name": …, "log": one row an epoch}]; None where the file is missing."""
-    path = folder / name
-    return json.loads(path.read_text(encoding="utf-8"))["runs"] if path.is_file() else None
 
 
 def table_3(folder: Path = FOLDER) -> str:

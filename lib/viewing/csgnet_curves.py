@@ -1,0 +1,23 @@
+"""How CSGNet's longer trainings went, an epoch a row, read from results/csgnet.
+
+long_runs()          curves of trainings without a teacher, or None where they were not kept
+long_runs(TAUGHT)    of trainings with one, whose programs have parts that nobody sees, or have none
+"""
+
+import json
+from pathlib import Path
+
+from lib.viewing.csgnet_paper import RESULTS
+
+CURVES, TAUGHT = "reinforce_curves.json", "teaching_curves.json"
+TRAIN = "python -m lib.training csgnet_reinforce"
+NO_CURVES = (
+    f"results/csgnet/{CURVES} is not there yet; these make such curves, in runs/: "
+    f"`{TRAIN}`, and `{TRAIN} --start scratch`"
+)
+
+
+def long_runs(name: str = CURVES, folder: Path = RESULTS) -> list[dict] | None:
+    """[{"name": …, "log": one row an epoch}]; None where the file is missing."""
+    path = folder / name
+    return json.loads(path.read_text(encoding="utf-8"))["runs"] if path.is_file() else None

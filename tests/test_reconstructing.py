@@ -181,6 +181,8 @@ def untrained(kind: type, seed: int) -> torch.nn.Module:
     with torch.no_grad():
         for head in network.primitives:
             head.numbers.bias.view(head.count, -1)[:, 7:] += 1.5  # after rotation and translation
+        if kind is UCSG:
+            network.margin.fill_(0.02)  # a new one's is 1: half of that around the primitives fills all space
     return network
 
 

@@ -78,7 +78,7 @@ def hand_made(temperature: float = 1e-3, margin: float = 1e-4) -> SoftTree:
 def test_layers_choose_and_combine():
     said, places = hand_made(), points(2000).float()
     distances = said.distances(places[None])
-    a, b, c = distances[0] <= 0
+    a, b, c = distances[0] <= said.margin / 2
     expected = a & ~b | b & c
     assert torch.equal(said.inside(distances)[0], expected)
     assert said.used().tolist() == [[True, True, True]]
@@ -93,9 +93,18 @@ def test_layers_choose_and_combine():
 def test_signed_distances_are_min_and_max_along_the_tree():
     said, places = hand_made(), points(2000).float()
     distances = said.distances(places[None])
-    a, b, c = distances[0]
+    a, b, c = distances[0] - said.margin / 2
     expected = torch.minimum(torch.maximum(a, -b), torch.maximum(b, c))
     assert torch.equal(said.signed(distances), expected[None])
+
+
+def test_a_decided_primitive_ends_where_the_soft_one_is_one_half():
+    said, places = hand_made(margin=0.2), points(2000).float()
+    distances = said.distances(places[None])
+    a, b, c = (1 - distances[0] / 0.2).clamp(0, 1) >= 0.5
+    expected = a & ~b | b & c
+    assert torch.equal(said.inside(distances)[0], expected)
+    assert 20 < (expected != hand_made().inside(distances)[0]).sum()  # without the margin it is another solid
 
 
 def decided(said: SoftTree, inside: torch.Tensor, row: int) -> torch.Tensor:
@@ -114,9 +123,9 @@ def test_signs_are_what_the_decided_tree_says_with_yes_and_no():
     for seed in range(20):
         torch.manual_seed(seed)
         said = UCSG(TINY).eval()(points(60).float().view(2, 30, 3))
-        distances = said.distances(points(1000).float().expand(2, -1, -1)).detach() - 0.1  # larger ones
-        signed = said.signed(distances)
-        expected = torch.stack([decided(said, distances[row] <= 0, row) for row in range(2)])
+        distances = said.distances(points(1000).float().expand(2, -1, -1)).detach() + 0.4  # smaller ones: the margin is 1
+        signed, half = said.signed(distances), said.margin.detach() / 2
+        expected = torch.stack([decided(said, distances[row] - half <= 0, row) for row in range(2)])
         assert torch.equal(signed <= 0, expected) and torch.equal(said.inside(distances), expected)
         found.append(expected.float().mean().item())
     assert sum(0.05 < share < 0.95 for share in found) > 10

@@ -9,7 +9,7 @@
 
 A GRU walks along with the layers: what was chosen before decides, with the code, what is chosen next. Choices are
 softmax weights, in training with Gumbel noise and a learned temperature, driven to 0; when all is decided, the one with
-the greatest weight. (UCSG-Net keeps its noise when it is tested, which makes its answers random; here it is off.)
+the greatest weight, and a primitive ends where its O is one half: distance = margin / 2. (UCSG-Net keeps its noise when it is tested, which makes its answers random; here it is off.)
 """
 
 from dataclasses import dataclass
@@ -81,7 +81,8 @@ class SoftTree:
 
     def signed(self, distances: Float[Tensor, "b k m"]) -> Float[Tensor, "b m"]:
         """Decided, too: negative inside, 0 on the surface; the smaller of two for "or", the larger for "and"."""
-        found = distances
+        # A training that is cut short leaves a margin as wide as a leg: at distance 0 its legs would be too thin.
+        found = distances = distances - self.margin / 2
         for logits in self.choices:
             chosen = logits.argmax(2)  # (b, 2, nodes)
             rows = chosen.unsqueeze(-1).expand(-1, -1, -1, found.shape[2])

@@ -123,7 +123,9 @@ def test_signs_are_what_the_decided_tree_says_with_yes_and_no():
     for seed in range(20):
         torch.manual_seed(seed)
         said = UCSG(TINY).eval()(points(60).float().view(2, 30, 3))
-        distances = said.distances(points(1000).float().expand(2, -1, -1)).detach() + 0.4  # smaller ones: the margin is 1
+        distances = (
+            said.distances(points(1000).float().expand(2, -1, -1)).detach() + 0.4
+        )  # smaller ones: the margin is 1
         signed, half = said.signed(distances), said.margin.detach() / 2
         expected = torch.stack([decided(said, distances[row] - half <= 0, row) for row in range(2)])
         assert torch.equal(signed <= 0, expected) and torch.equal(said.inside(distances), expected)

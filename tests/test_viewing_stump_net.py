@@ -111,6 +111,12 @@ def test_the_table_has_the_measured_rows(tmp_path):
     assert [text.get_text() for text in rivals_figure(path).axes[0].texts] == ["1.23", "1.23"]
     with pytest.raises(FileNotFoundError, match="measure_stump_net"):
         rivals(tmp_path / "none.json")
+    (tmp_path / "seed_1").mkdir()
+    second = {name: row | {"chamfer_mean": 9.0} for name in ("zebra", "bounding_box", "unknown")}
+    (tmp_path / "seed_1" / "r.json").write_text(json.dumps({"rows": second}))
+    lines = rivals_table(path).splitlines()
+    assert len(lines) == 3 and lines[0].endswith("CD, seed 1")
+    assert lines[1].split()[-1] == "-" and lines[2].split()[-1] == "9.00"  # a box has no seed
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@
 
 A GRU walks along with the layers: what was chosen before decides, with the code, what is chosen next. Choices are
 softmax weights, in training with Gumbel noise and a learned temperature, driven to 0; when all is decided, the one with
-the greatest weight, and a primitive ends where its O is one half: distance = margin / 2. (UCSG-Net keeps its noise when it is tested, which makes its answers random; here it is off.)
+the greatest weight, and a primitive ends where its O is one half: distance = margin / 2. (UCSG-Net keeps its noise when
+it is tested, which makes its answers random; here it is off.)
 """
 
 from dataclasses import dataclass

@@ -36,7 +36,8 @@ RESULT = REPOSITORY / "results" / "stump_net" / "ablation.json"
 CHOICES = {
     "default": "",
     "linear head": "--head linear",
-    "never steeper connections": "--steepest 1",
+    "steeper connections": "--connections steeper",
+    "straight-through connections": "--connections straight_through",
     "sharp surfaces from the start": "--dullest 150",
     "softmax means": "--power 0",
     "pull as the authors": "--pull authors",

@@ -72,9 +72,9 @@ def test_all_choices_are_options_that_the_training_takes():
 
 
 def test_a_training_that_cannot_end_leaves_no_table(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(ablate_stump_net, "CHOICES", {"too steep": "--steepest 0"})
+    monkeypatch.setattr(ablate_stump_net, "CHOICES", {"too dull": "--dullest 0"})
     assert main(tmp_path) == 1
-    assert "steepest" in capsys.readouterr().err and not (tmp_path / "found.json").exists()
+    assert "dullest" in capsys.readouterr().err and not (tmp_path / "found.json").exists()
 
 
 def test_clouds_that_were_not_made(tmp_path, capsys, monkeypatch):

@@ -87,9 +87,32 @@ def test_few_points_are_the_noises_choice():
     assert losses[0] == losses[1] != losses[2]
 
 
-def test_the_sigmoid_gets_steeper_in_the_second_half():
-    lesson = Lesson(steepest=9)
-    assert [lesson.steepness(p) for p in (0, 0.5, 0.75, 1)] == [1, 1, 5, 9]
+def test_steeper_connections_are_so_in_the_second_half():
+    lesson = Lesson(connections="steeper")
+    assert [lesson.steepness(p) for p in (0, 0.5, 0.75, 1)] == [1, 1, 4.5, 8]
+    assert {Lesson(connections=other).steepness(1.0) for other in ("soft", "straight_through")} == {1}
+
+
+@pytest.mark.parametrize("name", ["pull", "connections"])
+def test_other_names_are_refused(name):
+    with pytest.raises(ValueError, match=f"found .*{name} 'both'; expected one of"):
+        Lesson(**{name: "both"})
+
+
+def test_straight_through_connections_are_decided_and_have_a_slope():
+    students = {
+        name: task_of(lesson=Lesson(points=20, queries=40, connections=name)).student
+        for name in ("soft", "straight_through")
+    }
+    clouds, asked = balls(3).points.float(), balls(3).queries.float()
+    said = students["straight_through"].network(clouds)
+    distances = said.distances(asked)
+    sharp = [students[name].soft(said, distances) for name in ("straight_through", "soft")]
+    hard = [(logits > 0).float() * 80 - 40 for logits in said.logits]
+    expected = SoftStump(said.primitives, *hard).occupancy(distances)
+    assert torch.allclose(sharp[0], expected, atol=1e-5) and not torch.allclose(*sharp, atol=1e-2)
+    slope = torch.autograd.grad(sharp[0].sum(), said.intersection)[0]
+    assert (slope != 0).any()
 
 
 def test_surfaces_get_sharper_in_the_first_half():
@@ -202,7 +225,9 @@ def test_the_papers_settings(tmp_path):
     assert train("--paper", *FEW, "--category", "table", "--out", tmp_path) == 0
     settings = json.loads((tmp_path / "stump_net.json").read_text())["settings"]
     assert settings["rate"] == 1e-4 and settings["last"] == 1 and settings["network"]["neighbours"] == 20
-    assert settings["lesson"] | {"temperature": 20, "power": None, "steepest": 1} == settings["lesson"]
+    assert (
+        settings["lesson"] | {"temperature": 20, "power": None, "connections": "soft"} == settings["lesson"]
+    )
 
 
 @pytest.mark.parametrize(
@@ -211,8 +236,8 @@ def test_the_papers_settings(tmp_path):
         (["--primitives", "6"], "TrainingError: found 6 primitives of 4 kinds"),
         (["--nodes", "0"], "TrainingError: found StumpNetConfig(primitives=8, nodes=0"),
         (["--dullest", "151"], "TrainingError: found dullest 151; expected more than 0, at most 150"),
-        (["--steepest", "0.5"], "TrainingError: found 16 points, 32 queries, weight 0.001, steepest 0.5"),
-        (["--steepest", "nan"], "TrainingError: found 16 points, 32 queries, weight 0.001, steepest nan"),
+        (["--weight", "-1"], "TrainingError: found 16 points, 32 queries, weight -1.0"),
+        (["--weight", "nan"], "TrainingError: found 16 points, 32 queries, weight nan"),
         (["--weight", "inf"], "TrainingError: found 16 points, 32 queries, weight inf"),
         (["--queries", "1"], "TrainingError: found 16 points, 1 queries"),
         (["--power", "-1"], "TrainingError: found a power of -1"),

@@ -41,9 +41,15 @@ class SoftStump:
         power: float | None = POWER,
         temperature: float | None = None,
         sharpness: float = SHARPNESS,
+        straight_through: bool = False,
     ) -> Float[Tensor, "b m"]:
-        """From 0 outside to 1 inside, of points with these distances; differentiable. See `layers.soft`."""
+        """From 0 outside to 1 inside, of points with these distances; differentiable. See `layers.soft`.
+
+        straight_through: connections are decided, and their gradient is that of the sigmoid
+        """
         matrices = [torch.sigmoid(steepness * logits) for logits in self.logits]
+        if straight_through:
+            matrices = [w + ((w > 0.5).to(w) - w).detach() for w in matrices]
         return layers.soft(torch.sigmoid(-sharpness * distances), *matrices, temperature, power)[1]
 
     def inside(self, distances: Float[Tensor, "b k m"]) -> Bool[Tensor, "b m"]:

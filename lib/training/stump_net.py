@@ -5,9 +5,12 @@
 The second term pulls every primitive's surface to the nearest test point, so that those far away get a gradient. The
 authors' program squares the minimum instead ("authors"), which also shrinks primitives until no point is deep inside.
 
-Connections begin soft, W = sigmoid(logit). In the second half of a training the sigmoid gets steeper, so that in the
-end little is left to be decided when W becomes 0 or 1. In the first half surfaces get sharper, from `dullest` to the
-paper's 150: a dull surface is seen by more points, which can pull at it.
+Connections are soft, W = sigmoid(logit). Two ways that were meant to leave less to be decided when W becomes 0 or 1 are
+options, to compare with (data_scripts.ablate_stump_net): "steeper", W = sigmoid(s logit) with s growing to 8 in the
+second half of a training; and "straight_through", W decided already, with the gradient of the sigmoid.
+
+In the first half surfaces get sharper, from `dullest` to the paper's 150: a dull surface is seen by more points, which
+can pull at it.
 """
 
 import math
@@ -24,6 +27,8 @@ from ..models.stump_net import StumpNet
 from .solids import Student
 
 PULLS = ("paper", "authors")
+CONNECTIONS = ("soft", "steeper", "straight_through")
+STEEP = 8.0  # of "steeper" connections, in the end
 
 
 @dataclass(frozen=True)
@@ -32,17 +37,17 @@ class Lesson:
 
     points, queries  of each cloud that are seen in a step, and asked about (half of these inside)
     pull        "paper" or "authors": how the second term is meant; weight: what it is multiplied with
-    steepest    of the connections' sigmoid, at the end
+    connections one of CONNECTIONS, see above
     dullest     of the surfaces' sigmoid, at the beginning
     power, temperature  of the soft layers: one of them, see interpreters.stump.layers
-    Raises ValueError for another pull, and for numbers that make no sense.
+    Raises ValueError for other pulls and connections, and for numbers that make no sense.
     """
 
     points: int = 256
     queries: int = 512
     pull: str = "paper"
     weight: float = 1e-3
-    steepest: float = 8.0
+    connections: str = "soft"
     dullest: float = 10.0
     power: float | None = 8.0
     temperature: float | None = None
@@ -50,11 +55,14 @@ class Lesson:
     def __post_init__(self) -> None:
         if self.pull not in PULLS:
             raise ValueError(f"found the pull {self.pull!r}; expected one of {', '.join(PULLS)}")
-        enough = self.points >= 1 and self.queries >= 2
-        if not (enough and 0 <= self.weight < math.inf and 1 <= self.steepest < math.inf):
+        if self.connections not in CONNECTIONS:
             raise ValueError(
-                f"found {self.points} points, {self.queries} queries, weight {self.weight}, steepest {self.steepest}; "
-                "expected at least 1, 2, 0 and 1, and finite"
+                f"found connections {self.connections!r}; expected one of {', '.join(CONNECTIONS)}"
+            )
+        if not (self.points >= 1 and self.queries >= 2 and 0 <= self.weight < math.inf):
+            raise ValueError(
+                f"found {self.points} points, {self.queries} queries, weight {self.weight}; "
+                "expected at least 1, 2 and 0, and finite"
             )
         if not 0 < self.dullest <= SHARPNESS:
             raise ValueError(f"found dullest {self.dullest:g}; expected more than 0, at most {SHARPNESS:g}")
@@ -67,8 +75,8 @@ class Lesson:
             )
 
     def steepness(self, progress: float) -> float:
-        """Of the sigmoid when a share `progress` of all steps is done."""
-        return 1 + (self.steepest - 1) * max(0.0, 2 * progress - 1)
+        """Of the connections' sigmoid when a share `progress` of all steps is done."""
+        return 1 + (STEEP - 1) * max(0.0, 2 * progress - 1) if self.connections == "steeper" else 1.0
 
     def sharpness(self, progress: float) -> float:
         """Of the surfaces; it grows by equal factors in equal times."""
@@ -85,21 +93,23 @@ class StumpStudent(Student):
 
     def forward(self, clouds, asked, inside, progress, noise):
         """See Student; the terms are "reconstruction" and "pull"."""
-        said, lesson = self.network(clouds), self.lesson
+        said = self.network(clouds)
         distances = said.distances(asked)
-        found = said.occupancy(
+        found = self.soft(said, distances, progress)
+        reconstruction, pull = (found - inside).square().mean(), pulled(distances, self.lesson.pull)
+        return reconstruction + self.lesson.weight * pull, {"reconstruction": reconstruction, "pull": pull}
+
+    def soft(self, said, distances, progress=1.0):
+        """See Student; or as in another step."""
+        lesson = self.lesson
+        return said.occupancy(
             distances,
             lesson.steepness(progress),
             lesson.power,
             lesson.temperature,
             lesson.sharpness(progress),
+            lesson.connections == "straight_through",
         )
-        reconstruction, pull = (found - inside).square().mean(), pulled(distances, lesson.pull)
-        return reconstruction + lesson.weight * pull, {"reconstruction": reconstruction, "pull": pull}
-
-    def soft(self, said, distances):
-        """See Student."""
-        return said.occupancy(distances, self.lesson.steepest, self.lesson.power, self.lesson.temperature)
 
     def figures(self, said):
         """See `use`."""

@@ -9,14 +9,13 @@ from ..models.stump_net import HEADS, MADE_OF, StumpNet, StumpNetConfig
 from . import solids_command
 from .commands import Command, Job, Setting
 from .loop import TrainingError
-from .stump_net import PULLS, Lesson, StumpStudent
+from .stump_net import CONNECTIONS, PULLS, Lesson, StumpStudent
 
 SETTINGS = (
     *solids_command.LOOP,
     Setting("primitives", int, 64, 256, "K, as many of each kind"),
     Setting("nodes", int, 64, 256, "C"),
     Setting("weight", float, 1e-3, 1e-3, "of the term that pulls primitives to points"),
-    Setting("steepest", float, 8.0, 1.0, "of the connections' sigmoid at the end"),
     Setting("dullest", float, 10.0, 150.0, "of the surfaces' sigmoid at the beginning"),
     Setting("power", float, 8.0, 0.0, "of the soft layers' means; 0: softmax of --temperature"),
     Setting("temperature", float, 20.0, 20.0, "of the soft layers, if the power is 0"),
@@ -38,6 +37,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--pull", choices=PULLS, default=PULLS[0], help="the loss's second term (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--connections",
+        choices=CONNECTIONS,
+        default=CONNECTIONS[0],
+        help="while it learns (default: %(default)s)",
     )
     parser.add_argument("--no_complement", action="store_true", help="no primitive is complemented")
 
@@ -65,7 +70,7 @@ def _config(options: argparse.Namespace) -> StumpNetConfig:
 
 def _lesson(options: argparse.Namespace) -> Lesson:
     means = {"power": options.power} if options.power else {"power": None, "temperature": options.temperature}
-    names = ("points", "queries", "pull", "weight", "steepest", "dullest")
+    names = ("points", "queries", "pull", "weight", "connections", "dullest")
     return Lesson(**{name: getattr(options, name) for name in names}, **means)
 
 

@@ -3,7 +3,7 @@
 sheet({"cloud": clouds, "CSG-Stump Net": meshes}, titles)     a row for each, a column for each shape
 parts_of(said, surface, by="node")                            the surface, coloured by what made each face
 training_figure(log)                                          loss and IoU over the epochs
-gap_figure(said, steepest)                                    how decided the connections are
+gap_figure(said)                                              how decided the connections are
 use_figure(used)                                              which primitives and nodes some answers use
 rivals_table(), rivals_figure()                               what results/stump_net/ says
 
@@ -158,16 +158,13 @@ def training_figure(log: Sequence[Mapping[str, float]]) -> Figure:
     return figure
 
 
-def gap_figure(said: SoftStump, steepest: float) -> Figure:
-    """How many connections of some answers have which value, with a plain sigmoid and with a steep one."""
-    logits = torch.cat([each.flatten() for each in said.logits]).detach()
+def gap_figure(said: SoftStump) -> Figure:
+    """How many connections of some answers have which value."""
+    values = torch.cat([each.flatten() for each in said.logits]).detach().sigmoid().numpy()
     figure, ax = plt.subplots(figsize=(6, 2.6), dpi=100)
     plt.close(figure)
-    for steepness, color in ((1.0, "#9aa5b8"), (steepest, "#1d3557")):
-        values = torch.sigmoid(steepness * logits).numpy()
-        ax.hist(values, np.linspace(0, 1, 41), histtype="step", color=color, label=f"steepness {steepness:g}")
+    ax.hist(values, np.linspace(0, 1, 41), color="#1d3557")
     ax.set(yscale="log", xlabel="value of a connection", ylabel="connections")
-    ax.legend(fontsize=8, frameon=False)
     ax.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
     return figure

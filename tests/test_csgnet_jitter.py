@@ -1,10 +1,13 @@
-"""Pictures that are moved and stretched a little."""
+"""Pictures that are moved and stretched a little; the table of what that brings."""
+
+import json
 
 import pytest
 import torch
 
 from lib.interpreters.csg import execute_many, parse
 from lib.training.csgnet_jitter import jittered
+from lib.viewing.jitter_table import FURNITURE, RANDOM, WITHOUT, jitter_table
 
 
 def noise(seed: int = 0) -> torch.Generator:
@@ -51,3 +54,22 @@ def test_a_seed_decides():
 def test_edges_repeat():
     everything = torch.ones(50, 64, 64, dtype=torch.bool)
     assert jittered(everything, 1.0, noise()).all()
+
+
+def test_the_table_has_a_line_for_each_network(tmp_path):
+    for number, place in enumerate((WITHOUT, f"{WITHOUT}/seed_1", "", "seed_1")):
+        folder = tmp_path / place
+        folder.mkdir(parents=True, exist_ok=True)
+        random = {name: {"chamfer_px": number + k / 10} for k, name in enumerate(RANDOM)}
+        furniture = {name: {"chamfer_px": {"0": 10.0 * number + k}} for k, name in enumerate(FURNITURE)}
+        (folder / "synthetic_2d.json").write_text(json.dumps({"rows": random}))
+        (folder / "silhouettes.json").write_text(json.dumps({"rows": furniture}))
+    lines = jitter_table(tmp_path).splitlines()
+    assert [line.split()[-5:] for line in lines[2:]] == [
+        [f"{n:.2f}", f"{n + 0.1:.2f}", f"{n + 0.2:.2f}", f"{10 * n:.2f}", f"{10 * n + 1:.2f}"]
+        for n in range(4)
+    ]
+    assert lines[3].startswith("without, seed 1") and lines[4].startswith("with jitter, seed 0")
+    (tmp_path / "seed_1" / "silhouettes.json").unlink()
+    with pytest.raises(FileNotFoundError, match="seed_1/silhouettes.json"):
+        jitter_table(tmp_path)

@@ -105,6 +105,8 @@ def test_a_decided_primitive_ends_where_the_soft_one_is_one_half():
     expected = a & ~b | b & c
     assert torch.equal(said.inside(distances)[0], expected)
     assert 20 < (expected != hand_made().inside(distances)[0]).sum()  # without the margin it is another solid
+    below = hand_made(margin=-0.2)  # a step of the training may go too far
+    assert torch.equal(below.inside(distances), hand_made().inside(distances))
 
 
 def decided(said: SoftTree, inside: torch.Tensor, row: int) -> torch.Tensor:

@@ -111,8 +111,8 @@ def test_straight_through_connections_are_decided_and_have_a_slope():
     hard = [(logits > 0).float() * 80 - 40 for logits in said.logits]
     expected = SoftStump(said.primitives, *hard).occupancy(distances)
     assert torch.allclose(sharp[0], expected, atol=1e-5) and not torch.allclose(*sharp, atol=1e-2)
-    slope = torch.autograd.grad(sharp[0].sum(), said.intersection)[0]
-    assert (slope != 0).any()
+    slopes = [torch.autograd.grad(each.sum(), said.intersection, retain_graph=True)[0] for each in sharp]
+    assert torch.equal(*slopes) and (slopes[0] != 0).any()
 
 
 def test_surfaces_get_sharper_in_the_first_half():

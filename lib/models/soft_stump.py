@@ -45,12 +45,17 @@ class SoftStump:
     ) -> Float[Tensor, "b m"]:
         """From 0 outside to 1 inside, of points with these distances; differentiable. See `layers.soft`.
 
-        straight_through: connections are decided, and their gradient is that of the sigmoid
+        straight_through: the values are those of decided connections, the gradient is that of soft ones
         """
+        values = torch.sigmoid(-sharpness * distances)
         matrices = [torch.sigmoid(steepness * logits) for logits in self.logits]
-        if straight_through:
-            matrices = [w + ((w > 0.5).to(w) - w).detach() for w in matrices]
-        return layers.soft(torch.sigmoid(-sharpness * distances), *matrices, temperature, power)[1]
+        found = layers.soft(values, *matrices, temperature, power)[1]
+        if not straight_through:
+            return found
+        with torch.no_grad():
+            matrices = [(logits > 0).to(values) for logits in self.logits]
+            decided = layers.soft(values, *matrices, temperature, power)[1]
+        return found + (decided - found).detach()
 
     def inside(self, distances: Float[Tensor, "b k m"]) -> Bool[Tensor, "b m"]:
         """The same with all decided."""

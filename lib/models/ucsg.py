@@ -62,9 +62,14 @@ class SoftTree:
         """Signed distance of each point to each primitive."""
         return torch.cat([batch.distance(points.unsqueeze(1)) for batch in self.primitives], 1)
 
+    @property
+    def width(self) -> Float[Tensor, ""]:
+        """The margin; never quite 0, nor below it, where a training may bring it."""
+        return self.margin.clamp(min=1e-4)
+
     def occupancy(self, distances: Float[Tensor, "b k m"]) -> Float[Tensor, "b m"]:
         """From 0 outside to 1 inside; differentiable."""
-        inside = 1 - (distances / self.margin.clamp(min=1e-4)).clamp(0, 1)
+        inside = 1 - (distances / self.width).clamp(0, 1)
         found = inside
         for k, logits in enumerate(self.choices):
             logits = logits if self.noise is None else logits + self.noise[k]
@@ -83,7 +88,7 @@ class SoftTree:
     def signed(self, distances: Float[Tensor, "b k m"]) -> Float[Tensor, "b m"]:
         """Decided, too: negative inside, 0 on the surface; the smaller of two for "or", the larger for "and"."""
         # A training that is cut short leaves a margin as wide as a leg: at distance 0 its legs would be too thin.
-        found = distances = distances - self.margin / 2
+        found = distances = distances - self.width / 2
         for logits in self.choices:
             chosen = logits.argmax(2)  # (b, 2, nodes)
             rows = chosen.unsqueeze(-1).expand(-1, -1, -1, found.shape[2])

@@ -81,8 +81,13 @@ def _told(path: Path, facts: dict) -> Checkpoint:
 
 
 def _same_run(path: Path, was: dict, now: dict) -> None:
-    if other := sorted(key for key in {*was, *now} if was.get(key) != now.get(key)):
-        changes = ", ".join(f"{key}: {was.get(key)!r} then, {now.get(key)!r} now" for key in other)
+    if other := _differing(was, now):
+        (was, now) = (
+            {name: value for key in other for name, value in _parts(key, each)} for each in (was, now)
+        )
+        changes = ", ".join(
+            f"{key}: {was.get(key)!r} then, {now.get(key)!r} now" for key in _differing(was, now)
+        )
         raise CheckpointError(f"{path}: belongs to another run ({changes})")
 
 
@@ -110,3 +115,13 @@ def _check(path: Path, found: dict[str, Tensor], expected: dict[str, Tensor]) ->
 
 def _described(tensor: Tensor | None) -> str:
     return "nothing" if tensor is None else f"{str(tensor.dtype)[6:]} {tuple(tensor.shape)}"
+
+
+def _differing(was: dict, now: dict) -> list[str]:
+    return sorted(key for key in {*was, *now} if was.get(key) != now.get(key))
+
+
+def _parts(key: str, about: dict) -> list[tuple[str, object]]:
+    """A setting, or those that it consists of."""
+    value = about.get(key)
+    return list(value.items()) if isinstance(value, dict) else [(key, value)]

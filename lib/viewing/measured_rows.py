@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Set
+from math import isfinite
 from pathlib import Path
 
 
@@ -14,9 +15,13 @@ def measured_rows(path: Path, rows: str, needed: Set[str], command: str) -> dict
         )
     try:
         found = json.loads(path.read_text(encoding="utf-8"))[rows]
-        whole = bool(found) and all(needed <= row.keys() for row in found.values())
+        whole = bool(found) and all(_measured(row[name]) for row in found.values() for name in needed)
     except (ValueError, LookupError, TypeError, AttributeError):
         whole = False
     if not whole:
         raise ValueError(f"{path}: found no {rows} as they are measured; make them again: {command}")
     return found
+
+
+def _measured(value: object) -> bool:
+    return isinstance(value, list) or isfinite(value)

@@ -198,7 +198,7 @@ def rivals_table(path: Path = RESULT, rows: str = "rows") -> str:
     """
     found, quantities = rivals(path, rows), dict(QUANTITIES)
     again = path.parent / SECOND / path.name
-    if again.is_file():
+    if again.is_file() and rows == "rows":
         quantities["again"] = "CD, seed 1", ".2f"
         for name, row in rivals(again, rows).items():
             if name in found and name not in WITHOUT_SEED:

@@ -7,8 +7,8 @@ authors' program squares the minimum instead ("authors"), which also shrinks pri
 
 Connections are soft, W = sigmoid(logit). Two ways that were meant to leave less to be decided when W becomes 0 or 1 are
 options, to compare with (data_scripts.ablate_stump_net): "steeper", W = sigmoid(s logit) with s growing to 8 in the
-second half of a training; and "straight_through", what decided connections say, with the gradient
-of soft ones.
+second half of a training; and "straight_through", what decided connections say, with the gradient of
+soft ones.
 
 In the first half surfaces get sharper, from `dullest` to the paper's 150: a dull surface is seen by more points, which
 can pull at it.

@@ -13,7 +13,7 @@ from lib.interpreters.stump import Box, Sphere
 from lib.models.soft_stump import SoftStump
 from lib.models.stump_net import StumpNet, StumpNetConfig
 from lib.models.ucsg import UCSG, UCSGConfig
-from lib.models.weights import load
+from lib.models.weights import CheckpointError, load
 from lib.training import commands
 from lib.training.__main__ import COMMANDS
 from lib.training.loop import CHECKPOINT, LOG, Schedule, fit
@@ -253,3 +253,14 @@ def test_bad_options_are_told_in_one_line(tmp_path, capsys, options, told):
     assert train(*FEW, *options, "--out", tmp_path / "run") == 1
     error = capsys.readouterr().err
     assert error.startswith(told) and error.count("\n") == 1 and not (tmp_path / "run").exists()
+
+
+def test_a_run_goes_on_with_the_same_lesson_only(tmp_path):
+    schedule = Schedule(epochs=1, batch=6, rate=0.01)
+    for name in ("soft", "steeper"):
+        task = task_of()
+        task.about = {"lesson": {"points": 20, "connections": name}}
+        if name == "soft":
+            fit(task, schedule, tmp_path)
+    with pytest.raises(CheckpointError, match=r"another run \(connections: 'soft' then, 'steeper' now\)"):
+        fit(task, schedule, tmp_path)

@@ -2,6 +2,7 @@
 
 import json
 import math
+from functools import partial
 
 import pytest
 import torch
@@ -16,6 +17,7 @@ from lib.viewing import csgnet_paper
 from lib.viewing.canvas import COLOR_A, COLORS
 from lib.viewing.csgnet_answers import boxes_figure, gallery_figure, lengths_figure
 from lib.viewing.csgnet_beam_tree import DROPPED, KEPT, MERGED, Beginning, beam_steps, tree_figure
+from lib.viewing.csgnet_curves import TAUGHT, long_runs
 from lib.viewing.csgnet_figures import (
     expected_figure,
     features_figure,
@@ -23,6 +25,8 @@ from lib.viewing.csgnet_figures import (
     rules_figure,
     steps_figure,
 )
+from lib.viewing.jitter_table import jitter_table
+from lib.viewing.silhouette_table import table_3
 from tests.csgnets import random_canvases, random_network
 
 WORDS = vocabulary_of(2)
@@ -236,8 +240,22 @@ def test_tables_show_what_was_measured(tmp_path):
     assert same == lines and last == "(with a second seed: k=10 0.62)"  # remembering has no seed
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"rows": [1]}', '{"rows": {"k=1": 3}}'])
+@pytest.mark.parametrize("content", ["", "{", "\xff", "[]", "{}", '{"rows": [1]}', '{"rows": {"k=1": 3}}'])
 def test_a_file_that_holds_no_table_is_told(tmp_path, content):
-    (tmp_path / "detection.json").write_text(content)
-    with pytest.raises(ValueError, match="detection.json: found no table of results"):
-        csgnet_paper.table(5, tmp_path)
+    for file, read in {
+        "detection.json": partial(csgnet_paper.table, 5),
+        "silhouettes.json": table_3,
+        "without_jitter/synthetic_2d.json": jitter_table,
+        "teaching_curves.json": partial(long_runs, TAUGHT),
+    }.items():
+        path = tmp_path / file
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content.encode("latin-1"))
+        with pytest.raises(ValueError, match=f"{file}: found .*(measure|make) it again"):
+            read(folder=tmp_path)
+
+
+def test_rows_without_their_quantity_are_told(tmp_path):
+    (tmp_path / "silhouettes.json").write_text('{"rows": {"nearest": {"iou": 3}}}')
+    with pytest.raises(ValueError, match="silhouettes.json: found no chamfer_px of nearest"):
+        table_3(tmp_path)

@@ -71,5 +71,5 @@ def test_the_table_has_a_line_for_each_network(tmp_path):
     ]
     assert lines[3].startswith("without, seed 1") and lines[4].startswith("with jitter, seed 0")
     (tmp_path / "seed_1" / "silhouettes.json").unlink()
-    with pytest.raises(FileNotFoundError, match="seed_1/silhouettes.json"):
+    with pytest.raises(ValueError, match="seed_1/silhouettes.json"):
         jitter_table(tmp_path)

@@ -11,7 +11,7 @@ from PIL import Image
 from lib.interpreters.csg import execute_many, parse
 from lib.training.bandit import estimate, exact_gradient, learn, pull, spread
 from lib.viewing.csgnet_curves import TAUGHT, long_runs
-from lib.viewing.csgnet_paper import SECOND
+from lib.viewing.csgnet_results import SECOND
 from lib.viewing.reinforce_figures import (
     answers_figure,
     estimate_figure,

@@ -240,6 +240,7 @@ def test_the_papers_settings(tmp_path):
         (["--weight", "nan"], "TrainingError: found 16 points, 32 queries, weight nan"),
         (["--weight", "inf"], "TrainingError: found 16 points, 32 queries, weight inf"),
         (["--queries", "1"], "TrainingError: found 16 points, 1 queries"),
+        (["--precision", "bf16-mixed"], "TrainingError: found the precision bf16-mixed; expected 32-true"),
         (["--power", "-1"], "TrainingError: found a power of -1"),
         (["--power", "0", "--temperature", "999"], "TrainingError: found a temperature of 999"),
         (["--seed", str(10**30)], "TrainingError: seed is 1000"),

@@ -9,8 +9,8 @@ from torch import nn
 
 from ..datasets import DataError
 from ..datasets.solid_clouds import SolidSet, solid_clouds
-from .commands import Job, Setting
-from .loop import Schedule
+from .commands import PRECISIONS, Job, Setting
+from .loop import Schedule, TrainingError
 from .solids import SolidTask, Student
 
 LOOP = (
@@ -47,7 +47,15 @@ def clouds_of(options: argparse.Namespace, split: str) -> SolidSet:
 
 
 def solid_job(options: argparse.Namespace, train: SolidSet, student: Student, lesson: object) -> Job:
-    """The student on the training clouds; some of validation are scored after every epoch."""
+    """The student on the training clouds; some of validation are scored after every epoch.
+
+    Raises DataError, and TrainingError for a precision that surfaces cannot be placed with.
+    """
+    if options.precision != PRECISIONS[0]:
+        raise TrainingError(
+            f"found the precision {options.precision}; expected {PRECISIONS[0]}: bfloat16 keeps three digits of a "
+            "distance, and surfaces are decided by less"
+        )
     names = ("epochs", "batch", "rate", "warmup", "last", "clip", "seed")
     schedule = Schedule(**{name: getattr(options, name) for name in names})
     network: nn.Module = student.network

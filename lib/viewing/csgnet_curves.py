@@ -4,10 +4,9 @@ long_runs()          curves of trainings without a teacher, or None where they w
 long_runs(TAUGHT)    of trainings with one, whose programs have parts that nobody sees, or have none
 """
 
-import json
 from pathlib import Path
 
-from lib.viewing.csgnet_paper import RESULTS
+from lib.viewing.csgnet_results import RESULTS, read_runs
 
 CURVES, TAUGHT = "reinforce_curves.json", "teaching_curves.json"
 TRAIN = "python -m lib.training csgnet_reinforce"
@@ -18,6 +17,5 @@ NO_CURVES = (
 
 
 def long_runs(name: str = CURVES, folder: Path = RESULTS) -> list[dict] | None:
-    """[{"name": …, "log": one row an epoch}]; None where the file is missing."""
-    path = folder / name
-    return json.loads(path.read_text(encoding="utf-8"))["runs"] if path.is_file() else None
+    """[{"name": …, "log": one row an epoch}]; None where the file is missing. Raises ValueError for a damaged one."""
+    return read_runs(folder / name)

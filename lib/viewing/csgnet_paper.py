@@ -7,13 +7,11 @@ paper describes. So the columns are no race, they tell what size of numbers to e
 `data_scripts.measure_csgnet` writes the files; those of networks that learned with a second seed are in `seed_1`.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-RESULTS = Path(__file__).parents[2] / "results" / "csgnet"
-SECOND = "seed_1"
+from lib.viewing.csgnet_results import RESULTS, SECOND, read_rows
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,7 @@ def table(number: int, folder: Path = RESULTS) -> str:
     """
     layout = TABLES[number]
     path = Path(folder) / layout.file
-    found = _read(path)
+    found = read_rows(path)
     heading = "".join(f"{name:>20s}" for name, _ in layout.columns.values())
     lines = [
         f"Table {number}, {layout.title}",
@@ -84,28 +82,14 @@ def table(number: int, folder: Path = RESULTS) -> str:
         f"{'':20s}" + f"{'paper':>12s}{'here':>8s}" * len(layout.columns),
     ]
     for method, (name, printed) in layout.methods.items():
-        ours = found.get("rows", {}).get(method, {})
+        ours = found["rows"].get(method, {})
         cells = zip(layout.columns.items(), printed, strict=True)
         lines.append(
             f"{name:20s}" + "".join(_cell(ours, key, form, each) for (key, (_, form)), each in cells)
         )
     return "\n".join(
-        [*lines, _about(found, layout), *_second_seed(_read(path.parent / SECOND / layout.file), layout)]
+        [*lines, _about(found, layout), *_second_seed(read_rows(path.parent / SECOND / layout.file), layout)]
     )
-
-
-def _read(path: Path) -> dict:
-    """The file's content; nothing where it is missing."""
-    if not path.is_file():
-        return {}
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        rows = found["rows"]
-        if all(isinstance(row, dict) for row in rows.values()):
-            return found
-    except (ValueError, KeyError, AttributeError, TypeError):
-        pass
-    raise ValueError(f"{path}: found no table of results; measure it again with data_scripts.measure_csgnet")
 
 
 def _cell(ours: Mapping, quantity: str, form: str, printed: float) -> str:
@@ -115,7 +99,7 @@ def _cell(ours: Mapping, quantity: str, form: str, printed: float) -> str:
 
 def _second_seed(found: Mapping, layout: Layout) -> list[str]:
     """A line with the first quantity of the methods that learn, measured with weights of another seed."""
-    rows = found.get("rows", {})
+    rows = found["rows"]
     quantity, (_, form) = next(iter(layout.columns.items()))
     said = [
         f"{name} {rows[name][quantity]:{form}}" for name in layout.methods if "=" in name and name in rows
@@ -124,7 +108,7 @@ def _second_seed(found: Mapping, layout: Layout) -> list[str]:
 
 
 def _about(found: Mapping, layout: Layout) -> str:
-    if not found:
+    if not found["rows"]:
         return f"(not measured here yet: {layout.command})"
     known = f", nearest of {found['known']:,} known ones" if "known" in found else ""
     return f"(here: {found['samples']:,} test programs{known}; measured by {layout.command})"

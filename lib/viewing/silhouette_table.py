@@ -3,11 +3,9 @@
 print(table_3())     the table of results/csgnet/silhouettes.json, or which command makes it
 """
 
-import json
 from pathlib import Path
 
-from lib.viewing.csgnet_paper import RESULTS as FOLDER
-from lib.viewing.csgnet_paper import SECOND
+from lib.viewing.csgnet_results import RESULTS, SECOND, read_rows
 
 TABLE = "silhouettes.json"
 NO_TABLE = (
@@ -24,13 +22,13 @@ PAPER = {  # mean Chamfer distance, px, after so many iterations of refinement: 
 }
 
 
-def table_3(folder: Path = FOLDER) -> str:
+def table_3(folder: Path = RESULTS) -> str:
     """Mean Chamfer distances to silhouettes, px, by iterations of refinement: ours, with a second seed where that was
-    measured, and the paper's below each."""
+    measured, and the paper's below each. Raises ValueError for a damaged file."""
     path = folder / TABLE
     if not path.is_file():
         return NO_TABLE
-    found, second = (_rows_of(each) for each in (path, folder / SECOND / TABLE))
+    found, second = (read_rows(each, {"chamfer_px"}) for each in (path, folder / SECOND / TABLE))
     lines = [f"{found['samples']} silhouettes ({found['data']})", " " * 24 + _cells(SWEEPS.values())]
     for name, printed in PAPER.items():
         if name in found["rows"]:
@@ -41,11 +39,6 @@ def table_3(folder: Path = FOLDER) -> str:
                 lines.append(f"{'':16s}{'seed 1':8s}{_cells(f'{ours[n]:.2f}' for n in SWEEPS)}")
             lines.append(f"{'':16s}{'paper':8s}{_cells(f'{value:.2f}' for value in printed)}")
     return "\n".join([*lines, *_powell_lines(found)])
-
-
-def _rows_of(path: Path) -> dict:
-    """The file's content; no rows where there is no file."""
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {"rows": {}}
 
 
 def _powell_lines(found: dict) -> list[str]:

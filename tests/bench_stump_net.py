@@ -25,7 +25,7 @@ MEANS = {"power": {"power": 8.0}, "softmax": {"power": None, "temperature": 20.0
 def stepper(head: str, mean: str) -> Callable[[], float]:
     """What makes one step, and returns the loss."""
     torch.manual_seed(0)
-    lesson = Lesson(2048, 2048, **MEANS[mean])
+    lesson = Lesson(2048, **MEANS[mean])
     student = StumpStudent(StumpNet(StumpNetConfig(head=head)), lesson).train()
     descent = torch.optim.Adam(student.parameters(), 1e-4)
     clouds, queries = torch.rand(2, 1, 2048, 3) - 0.5

@@ -223,11 +223,20 @@ def test_where_the_search_gives_up_there_is_nothing(monkeypatch, clouds):
         assert (found["empty"], found["primitives"], found["nodes"], found["iou"]) == (1, 0, 0, 0)
 
 
-def test_a_network_sees_no_more_points_than_in_its_training(monkeypatch, weights, clouds):
-    network, seen = measure_stump_net.network_of(weights["small"]), []
-    network.register_forward_pre_hook(lambda _, given: seen.append(tuple(given[0].shape)))
-    measure_stump_net.of_network(network, clouds, 0)
-    assert seen == [(1, measure_stump_net.SEEN, 3)]
+@pytest.mark.parametrize("points", [24, 40])
+def test_a_network_sees_as_many_points_as_in_its_training(clouds, points):
+    torch.manual_seed(0)
+    network = StumpNet(
+        StumpNetConfig(2, 2, ("box",), feature=8, widths=(8,), neighbours=3, points=points)
+    ).eval()
+    field, _ = measure_stump_net.of_network(network, clouds, 0)
+    cut = clouds[:1]
+    cut.points[:, points:] = 9.0
+    same, _ = measure_stump_net.of_network(network, cut, 0)
+    cut.points[:, points - 1] = 0.4
+    other, _ = measure_stump_net.of_network(network, cut, 0)
+    queries = clouds.queries[0].float()
+    assert torch.equal(field(queries), same(queries)) and not torch.equal(field(queries), other(queries))
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 20, 35, 400])

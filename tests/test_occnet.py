@@ -5,6 +5,7 @@ import pytest
 
 from lib.datasets import DataError
 from lib.datasets.occnet import read_occnet
+from tests.conftest import unchecked
 
 RADIUS, CENTER = 0.3, np.array([1.0, 2.0, 3.0])
 
@@ -120,9 +121,14 @@ def test_the_folder_one_is_in(folder, monkeypatch):
     assert read_occnet(".", "val").categories == (folder.name,)
 
 
-@pytest.mark.parametrize("given", [{"points": 0}, {"queries": 0}, {"queries": 7}, {"seed": -1}])
+@pytest.mark.parametrize(
+    "given", [{"points": 0}, {"queries": 0}, {"queries": 7}, {"seed": -1}, {"points": 5.5}, {"queries": "8"}]
+)
 def test_numbers_that_make_no_sense(folder, given):
-    with pytest.raises(DataError, match="expected at least 1, an even number from 2, 0"):
+    with (
+        unchecked(),
+        pytest.raises(DataError, match="expected whole numbers, at least 1, an even one from 2, and 0"),
+    ):
         read_occnet(folder, "val", **given)
 
 

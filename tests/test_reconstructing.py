@@ -1,6 +1,7 @@
 """Surfaces of decided fields: closed, where the formula says, and cut off where the cloud ends."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import trimesh
 
 from lib.datasets.solid_sampling import by_winding
 from lib.interpreters.stump import Box, Cylinder, Sphere
-from lib.models.reconstructing import CELL, reconstructed, surface
+from lib.models.reconstructing import CELL, decided, reconstructed, surface
 from lib.models.stump_net import StumpNet
 from lib.models.ucsg import UCSG, UCSGConfig
 from tests.conftest import unchecked
@@ -222,6 +223,33 @@ def test_reconstructed_is_the_surface_of_the_decided_field(kind):
     assert not found.is_empty
     low, high = cloud.aminmax(dim=0)
     assert (found.bounds[0] >= low.numpy() - 1e-5).all() and (found.bounds[1] <= high.numpy() + 1e-5).all()
+
+
+def test_the_first_points_are_looked_at_and_all_say_where_the_box_ends():
+    network, cloud = untrained(StumpNet, 0), clouds(1)[0]
+    few = StumpNet(replace(network.config, points=30)).eval()
+    few.load_state_dict(network.state_dict())
+    expected = surface(decided(few(cloud[None, :30])), cloud)
+    assert np.array_equal(reconstructed(few, cloud.double()).vertices, expected.vertices)
+    assert not np.array_equal(reconstructed(network, cloud).vertices, expected.vertices)
+
+
+@pytest.mark.parametrize(
+    "cloud, told",
+    [
+        (torch.zeros(0, 3), "without points"),
+        (torch.full((30, 3), torch.nan), "without points, or with some that are not finite"),
+        (torch.zeros(10, 2), "found points of shape"),
+        (3 * CLOUD, "box has diagonal 2.8[0-9] and a middle"),
+        (
+            CLOUD + 0.5,
+            "a middle 0.9[0-9]* from the origin; expected diagonal 1 around the origin, as lib.datasets",
+        ),
+    ],
+)
+def test_clouds_that_networks_do_not_know_are_refused(cloud, told):
+    with pytest.raises(ValueError, match=told):
+        reconstructed(untrained(StumpNet, 0), cloud)
 
 
 def test_a_network_that_unites_nothing_says_nothing():

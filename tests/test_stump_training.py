@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,8 +23,8 @@ from lib.training.stump_net import Lesson, StumpStudent, pulled, use
 from lib.training.ucsg import UCSGLesson, UCSGStudent
 from tests.conftest import unchecked
 
-TINY = StumpNetConfig(8, 4, rank=3, feature=8, widths=(8, 8), neighbours=3)
-LESSON = Lesson(points=12, queries=16)
+TINY = StumpNetConfig(8, 4, rank=3, feature=8, widths=(8, 8), neighbours=3, points=20)
+LESSON = Lesson(queries=40)
 
 
 @pytest.fixture(autouse=True)
@@ -46,14 +47,14 @@ def balls(count: int, seed: int = 0):
     return gathered(rows, "balls")
 
 
-def task_of(seed: int = 0, lesson: Lesson = LESSON) -> SolidTask:
+def task_of(seed: int = 0, lesson: Lesson = LESSON, config: StumpNetConfig = TINY) -> SolidTask:
     torch.manual_seed(seed)
-    return SolidTask(StumpStudent(StumpNet(TINY), lesson), balls(6), balls(3, seed=1), {})
+    return SolidTask(StumpStudent(StumpNet(config), lesson), balls(6), balls(3, seed=1), {})
 
 
 def rival_of(seed: int = 0) -> SolidTask:
     torch.manual_seed(seed)
-    student = UCSGStudent(UCSG(UCSGConfig(3, 2, 2, 8, (8,), 3)), UCSGLesson(20, 40))
+    student = UCSGStudent(UCSG(UCSGConfig(3, 2, 2, 8, (8,), 3, 20)), UCSGLesson(40))
     return SolidTask(student, balls(6), balls(3, seed=1), {})
 
 
@@ -65,7 +66,7 @@ def test_the_second_term_by_hand():
 
 
 def test_the_loss_is_both_terms():
-    task = task_of(lesson=Lesson(points=20, queries=40, weight=0.5, dullest=150))
+    task = task_of(lesson=Lesson(queries=40, weight=0.5, dullest=150))
     loss, terms = task.loss(task.network, [2, 0], torch.Generator().manual_seed(0), 0.0)
     clouds = task.train.points[[2, 0]].float()
     said = task.student.network(clouds)
@@ -79,7 +80,7 @@ def test_the_loss_is_both_terms():
 
 
 def test_few_points_are_the_noises_choice():
-    task = task_of()
+    task = task_of(lesson=Lesson(queries=16), config=replace(TINY, points=12))
     losses = [
         task.loss(task.network, [0, 1], torch.Generator().manual_seed(seed), 0.0)[0].item()
         for seed in (0, 0, 1)
@@ -99,20 +100,37 @@ def test_other_names_are_refused(name):
         Lesson(**{name: "both"})
 
 
+def test_power_and_temperature_exclude_each_other():
+    with pytest.raises(ValueError, match="found a power of 8 and a temperature of 20; expected one of them"):
+        Lesson(temperature=20.0)
+
+
 def test_straight_through_connections_are_decided_and_have_a_slope():
-    students = {
-        name: task_of(lesson=Lesson(points=20, queries=40, connections=name)).student
-        for name in ("soft", "straight_through")
-    }
-    clouds, asked = balls(3).points.float(), balls(3).queries.float()
-    said = students["straight_through"].network(clouds)
-    distances = said.distances(asked)
-    sharp = [students[name].soft(said, distances) for name in ("straight_through", "soft")]
+    said = task_of().student.network(balls(3).points.float())
+    distances = said.distances(balls(3).queries.float())
+    soft, straight = (said.occupancy(distances, straight_through=each) for each in (False, True))
     hard = [(logits > 0).float() * 80 - 40 for logits in said.logits]
     expected = SoftStump(said.primitives, *hard).occupancy(distances)
-    assert torch.allclose(sharp[0], expected, atol=1e-5) and not torch.allclose(*sharp, atol=1e-2)
-    slopes = [torch.autograd.grad(each.sum(), said.intersection, retain_graph=True)[0] for each in sharp]
+    assert torch.allclose(straight, expected, atol=1e-5) and not torch.allclose(straight, soft, atol=1e-2)
+    slopes = [
+        torch.autograd.grad(each.sum(), said.intersection, retain_graph=True)[0] for each in (soft, straight)
+    ]
     assert torch.equal(*slopes) and (slopes[0] != 0).any()
+
+
+def test_straight_through_is_for_learning_only():
+    """Its soft answers are those of soft connections: else nothing would be lost by deciding, whatever it learned."""
+    data, losses, soft = balls(3), {}, {}
+    asked = data.points.float(), data.queries.float(), data.inside.float()
+    for name in ("soft", "straight_through"):
+        student = task_of(lesson=Lesson(queries=40, weight=0, connections=name)).student.eval()
+        losses[name] = student(*asked, 1.0, torch.Generator())[0].item()
+        said = student.network(asked[0])
+        soft[name] = student.soft(said, said.distances(asked[1]))
+    assert torch.equal(*soft.values()) and losses["soft"] != pytest.approx(
+        losses["straight_through"], abs=1e-3
+    )
+    assert losses["soft"] == pytest.approx((soft["soft"] - asked[2]).square().mean().item(), abs=1e-6)
 
 
 def test_surfaces_get_sharper_in_the_first_half():
@@ -135,12 +153,30 @@ def test_overlap_and_use_by_hand():
     assert (found["primitives"].item(), found["nodes"].item()) == (2, 1)
     assert found["size"].item() == pytest.approx((6 * 0.1 + 2 * 0.4) / 8)
     p = 1 / (1 + math.exp(-9))
-    assert found["entropy"].item() == pytest.approx(-p * math.log2(p) - (1 - p) * math.log2(1 - p), rel=1e-3)
+    sure = -p * math.log2(p) - (1 - p) * math.log2(
+        1 - p
+    )  # 8 cells and 2 nodes; of 4 complements one bit each
+    assert found["entropy"].item() == pytest.approx((4 + 10 * sure) / 14, rel=1e-3)
+    never = torch.full((1, 4), -torch.inf)
+    assert use(replace(said, complement=never))["entropy"].item() == pytest.approx(10 * sure / 14, rel=1e-3)
+
+
+def test_sizes_are_lengths():
+    """A cone's slope is none, nor are a superquadric's exponents."""
+    config = replace(TINY, kinds=("cone",))
+    network = StumpNet(config).eval()
+    points = balls(2).points.float()
+    assert use(network(points))["size"].tolist() == [0, 0]
+    network = StumpNet(replace(config, kinds=("superquadric",))).eval()
+    found = network(points)
+    assert torch.allclose(use(found)["size"], found.primitives[0].half.flatten(1).mean(1))
+    with pytest.raises(ValueError, match="found primitives of the kind 'superquadric'; expected"):
+        found.stumps()
 
 
 def test_it_learns_balls(tmp_path):
     """A network of a moment on six balls: decided answers overlap most of other balls."""
-    task = task_of(lesson=Lesson(points=20, queries=40))
+    task = task_of()
     log = fit(task, Schedule(epochs=60, batch=6, rate=0.01, warmup=0.1, last=0.05), tmp_path)
     assert log[-1]["reconstruction"] < 0.5 * log[0]["reconstruction"]
     assert log[-1]["val_iou"] > 0.8 and abs(log[-1]["val_iou"] - log[-1]["val_soft_iou"]) < 0.1
@@ -236,10 +272,10 @@ def test_the_papers_settings(tmp_path):
         (["--primitives", "6"], "TrainingError: found 6 primitives of 4 kinds"),
         (["--nodes", "0"], "TrainingError: found StumpNetConfig(primitives=8, nodes=0"),
         (["--dullest", "151"], "TrainingError: found dullest 151; expected more than 0, at most 150"),
-        (["--weight", "-1"], "TrainingError: found 16 points, 32 queries, weight -1.0"),
-        (["--weight", "nan"], "TrainingError: found 16 points, 32 queries, weight nan"),
-        (["--weight", "inf"], "TrainingError: found 16 points, 32 queries, weight inf"),
-        (["--queries", "1"], "TrainingError: found 16 points, 1 queries"),
+        (["--weight", "-1"], "TrainingError: found 32 queries, weight -1.0"),
+        (["--weight", "nan"], "TrainingError: found 32 queries, weight nan"),
+        (["--weight", "inf"], "TrainingError: found 32 queries, weight inf"),
+        (["--queries", "1"], "TrainingError: found 1 queries"),
         (["--precision", "bf16-mixed"], "TrainingError: found the precision bf16-mixed; expected 32-true"),
         (["--power", "-1"], "TrainingError: found a power of -1"),
         (["--power", "0", "--temperature", "999"], "TrainingError: found a temperature of 999"),

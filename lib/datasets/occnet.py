@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from ..interpreters.checks import whole
 from .base import DataError, choose, read_arrays
 from .images import SPLITS
 from .solid_clouds import SolidSet, gathered
@@ -32,10 +33,13 @@ def read_occnet(
     Where there are fewer points inside, or outside, some come twice. Raises DataError for a folder that is none, for
     another split, no points or an odd number of queries, and for files that are missing, damaged or of another kind.
     """
-    if points < 1 or queries < 2 or queries % 2 or seed < 0:
+    asked = [whole(number) for number in (points, queries, seed)]
+    if None in asked or asked[0] < 1 or asked[1] < 2 or asked[1] % 2 or asked[2] < 0:
         raise DataError(
-            f"found {points} points, {queries} queries, seed {seed}; expected at least 1, an even number from 2, 0"
+            f"found {points!r} points, {queries!r} queries, seed {seed!r}; expected whole numbers, at least 1, an "
+            "even one from 2, and 0"
         )
+    points, queries, seed = asked
     folder = Path(folder)
     kind = folder.resolve().name  # of "." too
     rows = []

@@ -2,13 +2,14 @@
 
     cloud = read_cloud("mug.obj", count=2048)
     print(cloud.told)                            what was found, and what was done with it
-    network(cloud.points[None])                  shapes of diagonal 1
+    network(cloud.points[None])                  shapes of diagonal 1; it looks at as many as in its training
     cloud.back(stump_points)                     the way back into the file's units
 
 A mesh is sampled, uniform by area. Of a cloud without faces points are chosen. Points that are not finite, that come
 twice, or that lie far from all others are left out.
 """
 
+import itertools
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from ..interpreters.checks import whole
 from .base import DataError
 
 MESHES = (".obj", ".ply", ".stl", ".off", ".glb")
@@ -30,13 +32,15 @@ NEIGHBOURS = 8
 LARGEST = 1 << 28  # bytes of a file
 MOST = 1 << 20  # points that can be asked for
 SMALL, BIG = 1e-30, 1e30  # the networks' single precision can hold what lies between
-FEWEST_SAMPLED = 100  # of a mesh, however few are asked for
+SAMPLED = 1 << 14  # points of a mesh, however few are asked for: their box is nearly the mesh's
+AXES = ["x", "y", "z"]
 WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")  # a number with a decimal comma, or a whole one
 
 
 @dataclass(frozen=True)
 class OwnCloud:
-    """points: (file's point - middle) * scale each, around the origin, their bounding box with diagonal 1.
+    """points: (file's point - middle) * scale each, around the origin. The box of all points that were left, of which
+    these are some, has diagonal 1; of a mesh, that of 16,384 of its points or more.
 
     told: what was found and done, in sentences.
     """
@@ -52,18 +56,21 @@ class OwnCloud:
 
 
 def read_cloud(path: str | Path, count: int = 2048, seed: int = 0) -> OwnCloud:
-    """`count` points of the shape in a file, moved and scaled. Raises DataError for a file that shows no shape."""
+    """`count` points of the shape in a file, in random order, moved and scaled; fewer where a cloud has no more.
+
+    Raises DataError for a file that shows no shape, and for a count or a seed that is none.
+    """
     path = Path(path)
-    points, told = _points(path, count, seed)
+    points, told = _points(path, *_asked(count, seed))
     points, left_out = cleaned(points)
     if len(points) < FEWEST or not np.ptp(points, axis=0).any():
         raise DataError(f"{path}: found {len(points)} points that differ; expected a shape, {FEWEST} or more")
     if left_out:
         told.append(f"Left out: {left_out}.")
     rng = np.random.default_rng(seed)
-    chosen = np.resize(rng.permutation(len(points)), count)
+    chosen = rng.permutation(len(points))[:count]
     if len(points) < count:
-        told.append(f"There are fewer than {count}, so some come twice.")
+        told.append(f"Left are {len(points)} points, fewer than {count}.")
     low, high = points.min(0), points.max(0)
     if np.abs(points).max() > BIG or (high - low).max() < SMALL:
         raise DataError(
@@ -78,14 +85,17 @@ def read_cloud(path: str | Path, count: int = 2048, seed: int = 0) -> OwnCloud:
     return OwnCloud(made, torch.from_numpy(middle), scale, " ".join(told))
 
 
+def _asked(count: int, seed: int) -> tuple[int, int]:
+    """The same as ints. Raises DataError."""
+    if whole(count) is None or not 1 <= count <= MOST:
+        raise DataError(f"found a count of {count!r}; expected a whole number from 1 to {MOST}")
+    if whole(seed) is None or seed < 0:
+        raise DataError(f"found a seed of {seed!r}; expected a whole number, 0 or more")
+    return whole(count), whole(seed)
+
+
 def _points(path: Path, count: int, seed: int) -> tuple[np.ndarray, list[str]]:
     """Points of the file, and what it holds."""
-    if count < 1:
-        raise DataError(f"found a count of {count}; expected 1 or more")
-    if count > MOST:
-        raise DataError(f"found a count of {count}; expected at most {MOST}")
-    if seed < 0:
-        raise DataError(f"found a seed of {seed}; expected 0 or more")
     kind = path.suffix.lower()
     if kind not in (*MESHES, *TEXTS):
         raise DataError(
@@ -117,7 +127,7 @@ def _geometry(path: Path, count: int, seed: int) -> tuple[np.ndarray, list[str]]
         area = mesh.area_faces.sum()
     if not 0 < area < np.inf:
         raise DataError(f"{path}: found {len(mesh.faces)} triangles of area {area:g}; expected a surface")
-    points, _ = trimesh.sample.sample_surface(mesh, max(2 * count, FEWEST_SAMPLED), seed=seed)
+    points, _ = trimesh.sample.sample_surface(mesh, max(2 * count, SAMPLED), seed=seed)
     closed = "a closed surface" if _is_closed(mesh) else "a surface with gaps"
     return np.asarray(points), [f"A mesh of {len(mesh.faces)} triangles, {closed}."]
 
@@ -136,15 +146,14 @@ def _table(path: Path) -> tuple[np.ndarray, list[str]]:
     rows = []
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     for number, line in enumerate(text.splitlines(), start=1):
-        words = line.split("#")[0].replace(";", " ").split()
-        if len(words) < 3 or not all(map(WITH_COMMA.fullmatch, words[:3])):
-            words = " ".join(words).replace(",", " ").split()
+        words = _cells(line.split("#")[0])
         try:
             row = [float(word.replace(",", ".")) for word in words[:3]]
         except ValueError:
-            if not rows:
-                continue  # a heading
-            raise DataError(f"{path}, line {number}: found {line[:40]!r}; expected numbers x y z") from None
+            if rows or _told_otherwise(words):
+                found = f"{path}, line {number}: found {line[:40]!r}"
+                raise DataError(f"{found}; expected numbers x y z, the first in each line") from None
+            continue  # a heading
         if len(row) == 3:
             rows.append(row)
         elif words and rows:
@@ -152,6 +161,25 @@ def _table(path: Path) -> tuple[np.ndarray, list[str]]:
     if not rows:
         raise DataError(f"{path}: found no line that begins with three numbers; expected one for each point")
     return np.array(rows).reshape(-1, 3), [f"A cloud of {len(rows)} points."]
+
+
+def _cells(line: str) -> list[str]:
+    """What stands between semicolons, spaces or commas; empty texts where nothing stands between two marks."""
+    words = line.split()
+    if ";" in line:
+        parts = line.split(";")
+    elif len(words) >= 3 and all(map(WITH_COMMA.fullmatch, words[:3])):
+        return words
+    else:
+        parts = line.split(",") if "," in line else words
+    return list(itertools.chain.from_iterable(part.split() or [""] for part in parts)) if words else []
+
+
+def _told_otherwise(words: list[str]) -> bool:
+    """Whether it is no heading over x, y, z: a row with a gap, or names of which others come first."""
+    names = [word.strip("\"'/").lower() for word in words]
+    gap = "" in words[:3] and any(word and WITH_COMMA.fullmatch(word.replace(".", ",")) for word in words[:3])
+    return gap or set(AXES) <= set(names) and names[:3] != AXES
 
 
 def cleaned(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "m 3"], str]:

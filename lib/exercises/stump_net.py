@@ -5,14 +5,13 @@ import math
 import torch
 from torch import Tensor
 
-from ..models.simplifying import cover
+from ..models.simplifying import SHARE, cover
 from . import OK, UNANSWERED, hint
 
 TENTH = math.log(
     (1 + math.sqrt(0.9)) / (1 - math.sqrt(0.9))
 )  # where a sigmoid's slope is a tenth of its largest
 CLOSE = 0.03  # share that numbers may be off: read off a curve
-COVER = 0.99  # of the points, exercise 12.5
 
 
 def check_reach(answer: object) -> str:
@@ -108,10 +107,10 @@ def check_cover(answer: object) -> str:
         if not isinstance(found, Tensor) or found.dtype != torch.bool or found.shape != (c,):
             return hint(f"for {c} nodes the result should be a bool tensor ({c},), found {_shape(found)}")
         held = inside[found].any(0).sum() / inside.any(0).sum()
-        if held < COVER:
+        if held < SHARE:
             return hint(f"the nodes that are kept hold {held:.1%} of the points; expected 99 % or more")
-        if found.sum() > len(cover(inside, COVER)):
-            return hint(f"{int(found.sum())} nodes are kept, and {len(cover(inside, COVER))} would do")
+        if found.sum() > len(cover(inside, SHARE)):
+            return hint(f"{int(found.sum())} nodes are kept, and {len(cover(inside, SHARE))} would do")
     return OK
 
 

@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from ..interpreters.stump import Primitive, Stump, layers
+from ..interpreters.stump import KINDS, Primitive, Stump, layers
 
 SHARPNESS = 150.0  # of occupancy, per unit of length: the paper's eta, as in the authors' program
 POWER = 8.0  # of the soft layers' means, see interpreters.stump.powers
@@ -45,6 +45,7 @@ class SoftStump:
     ) -> Float[Tensor, "b m"]:
         """From 0 outside to 1 inside, of points with these distances; differentiable. See `layers.soft`.
 
+        power, temperature  of the means: the one that is used, the other one None. Raises ValueError for both.
         straight_through: the values are those of decided connections, the gradient is that of soft ones
         """
         values = torch.sigmoid(-sharpness * distances)
@@ -71,8 +72,18 @@ class SoftStump:
         """Complement (b, K), intersection (b, K, C), union (b, C)."""
         return self.complement, self.intersection, self.union
 
+    def used(self) -> tuple[Bool[Tensor, "b k"], Bool[Tensor, "b c"]]:
+        """Which primitives and which nodes each decided stump uses: nodes that are united, and what these select."""
+        nodes = self.union > 0
+        return ((self.intersection > 0) & nodes.unsqueeze(1)).any(2), nodes
+
     def stumps(self) -> Sequence[Stump]:
-        """The decided stump of each cloud, on the CPU, without what it does not use."""
+        """The decided stump of each cloud, on the CPU, without what it does not use.
+
+        Raises ValueError for primitives that the language does not have: a rival's superquadrics.
+        """
+        if foreign := [batch.name for batch in self.primitives if batch.name not in KINDS]:
+            raise ValueError(f"found primitives of the kind {foreign[0]!r}; expected {', '.join(KINDS)}")
         matrices = [(logits > 0).cpu() for logits in self.logits]
         batches = [batch.to("cpu") for batch in self.primitives]
         found = []

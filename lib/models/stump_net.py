@@ -14,8 +14,9 @@ the code weigh the products of their numbers:
 Outputs are scaled to shapes of diagonal 1 around the origin, and a new network begins with something sensible: small
 primitives all over the place, node c that selects primitive c, and a union of all nodes. Where primitive c has no end,
 the node selects one of those that have, too: a cylinder is cut by a box. With the head "own" node c is primitive c for
-ever: boxes alone are then a rival, volumetric primitives (Tulsiani et al. 2017), and superquadrics another (Paschalidou
-et al. 2019).
+ever: boxes alone are then a rival in the manner of volumetric primitives (Tulsiani et al. 2017), and superquadrics
+another (Paschalidou et al. 2019). Of these papers they have the primitives and their union; loss and training are those
+of this network, so that what differs are the layers, and none has its paper's probability that a primitive exists.
 """
 
 from dataclasses import dataclass
@@ -49,6 +50,7 @@ class StumpNetConfig:
     head        "low_rank", "linear" or "own", see above; rank: numbers of an embedding
     feature, widths     of the encoder's output, and of the decoder's layers, the code last
     neighbours  of a point, for the encoder, see DGCNN
+    points      of a cloud that are looked at, the first ones: how near neighbours are depends on it
     complement  False: no primitive is complemented, as in the authors' program
     Raises ValueError for other heads and kinds, sizes below 1, K that the kinds do not divide, and for the head "own"
     with another C than K.
@@ -63,14 +65,16 @@ class StumpNetConfig:
     widths: tuple[int, ...] = (512, 1024, 2048)
     neighbours: int = 20
     complement: bool = True
+    points: int = 2048
 
     def __post_init__(self) -> None:
         if self.head not in HEADS:
             raise ValueError(f"found the head {self.head!r}; expected one of {', '.join(HEADS)}")
         if not self.kinds or not set(self.kinds) <= MADE_OF.keys():
             raise ValueError(f"found the kinds {self.kinds}; expected some of {', '.join(MADE_OF)}")
-        if min(self.primitives, self.nodes, self.rank, self.feature, *self.widths) < 1:
-            raise ValueError(f"found {self}; expected sizes of at least 1")
+        sizes = (self.primitives, self.nodes, self.rank, self.feature, self.points)
+        if min(*sizes, *self.widths) < 1 or not self.widths:
+            raise ValueError(f"found {self}; expected sizes of at least 1, and one width or more")
         if self.primitives % len(self.kinds) or self.head == "own" and self.nodes != self.primitives:
             found = f"{self.primitives} primitives of {len(self.kinds)} kinds, {self.nodes} nodes, head {self.head!r}"
             raise ValueError(
@@ -80,12 +84,15 @@ class StumpNetConfig:
     @staticmethod
     def compact(primitives: int = 64, nodes: int = 64, **others) -> "StumpNetConfig":
         """A network that two cores can train; `others` are fields by name."""
-        small = {"rank": 128, "widths": (256, 512), "neighbours": 8}
+        small = {"rank": 128, "widths": (256, 512), "neighbours": 8, "points": 256}
         return StumpNetConfig(primitives, nodes, **small | others)
 
 
 class StumpNet(nn.Module):
-    """Points (b, n, 3) of shapes of diagonal 1 around the origin to a `SoftStump` of each."""
+    """Points (b, n, 3) of shapes of diagonal 1 around the origin, in any order, to a `SoftStump` of each.
+
+    Of more points than `config.points` the first are looked at; with fewer answers are worse.
+    """
 
     def __init__(self, config: StumpNetConfig):
         super().__init__()
@@ -102,7 +109,7 @@ class StumpNet(nn.Module):
 
     def forward(self, points: Float[Tensor, "b n 3"]) -> SoftStump:
         """What the network says of each cloud."""
-        code = self.decoder(self.encoder(points))
+        code = self.decoder(self.encoder(points[:, : self.config.points]))
         primitives = tuple(head(code) for head in self.primitives)
         if self.to_complement is None:
             complement = code.new_full((len(code), self.config.primitives), -torch.inf)

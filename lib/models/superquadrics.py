@@ -1,5 +1,8 @@
 """Superquadrics, from boxes with round edges to balls and stars: a rival's primitive (Paschalidou et al. 2019).
 
+Code that fits them to a cloud without learning (EMS, Liu et al. 2022) is a repository, not a package that pip finds; it
+is not among the rivals. Here a network says them.
+
     F(p) = ((x / a_x)^(2 / e_2) + (y / a_y)^(2 / e_2))^(e_2 / e_1) + (z / a_z)^(2 / e_1)      1 on the surface
     distance = |p| (1 - F^(-e_1 / 2))                                                          along the ray to p
 

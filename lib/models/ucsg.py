@@ -7,10 +7,11 @@
     inputs        of the first layer the primitives, of the next ones these and the outputs of the layer before
     the last      has one node, of which only "left or right" is the shape
 
-A GRU walks along with the layers: what was chosen before decides, with the code, what is chosen next. Choices are
-softmax weights, in training with Gumbel noise and a learned temperature, driven to 0; when all is decided, the one with
-the greatest weight, and a primitive ends where its O is one half: distance = margin / 2. (UCSG-Net keeps its noise when
-it is tested, which makes its answers random; here it is off.)
+A GRU walks along with the layers: what was chosen before decides, with the code, what is chosen next. (It is told the
+softmax weights; UCSG-Net's is told those with noise and temperature.) Choices are softmax weights, in training with
+Gumbel noise and a learned temperature, driven to 0; when all is decided, the one with the greatest weight, and a
+primitive ends where its O is one half: distance = margin / 2. (UCSG-Net keeps its noise when it is tested, which makes
+its answers random; here it is off.)
 """
 
 from dataclasses import dataclass
@@ -29,8 +30,10 @@ STATE = 256  # numbers of the GRU's state
 
 @dataclass(frozen=True)
 class UCSGConfig:
-    """each: primitives of a kind; layers; nodes: of all layers but the last; the rest: of encoder and decoder, see
-    StumpNetConfig. Raises ValueError for sizes below 1."""
+    """each: primitives of a kind; layers; nodes: of all layers but the last; the rest: see StumpNetConfig.
+
+    Raises ValueError for sizes below 1.
+    """
 
     each: int = 32
     layers: int = 5
@@ -38,10 +41,12 @@ class UCSGConfig:
     feature: int = 256
     widths: tuple[int, ...] = (256, 512)
     neighbours: int = 8
+    points: int = 256
 
     def __post_init__(self) -> None:
-        if min(self.each, self.layers, self.nodes, self.feature, *self.widths) < 1:
-            raise ValueError(f"found {self}; expected sizes of at least 1")
+        sizes = (self.each, self.layers, self.nodes, self.feature, self.points)
+        if min(*sizes, *self.widths) < 1 or not self.widths:
+            raise ValueError(f"found {self}; expected sizes of at least 1, and one width or more")
 
 
 @dataclass(frozen=True)
@@ -125,7 +130,8 @@ def _combined(left: Tensor, right: Tensor, union_only: bool) -> Tensor:
 
 
 class UCSG(nn.Module):
-    """Points (b, n, 3) of shapes of diagonal 1 around the origin to a `SoftTree` of each."""
+    """Points (b, n, 3) of shapes of diagonal 1 around the origin to a `SoftTree` of each; of more points than
+    `config.points` the first are looked at."""
 
     def __init__(self, config: UCSGConfig):
         super().__init__()
@@ -144,7 +150,7 @@ class UCSG(nn.Module):
 
     def forward(self, points: Float[Tensor, "b n 3"], noise: torch.Generator | None = None) -> SoftTree:
         """noise: of the choices, on the CPU; None: there is none."""
-        code = self.decoder(self.encoder(points))
+        code = self.decoder(self.encoder(points[:, : self.config.points]))
         state, choices = self.first.expand(len(code), -1), []
         for choose in self.choose:
             logits, state = choose(code, state)

@@ -31,12 +31,18 @@ class Said(Protocol):
         """The same as a field: negative inside, 0 on the surface."""
 
 
+class Lesson(Protocol):
+    """How a network is taught. queries: of each cloud that are asked about in a step, half of them inside."""
+
+    queries: int
+
+
 class Student(nn.Module):
-    """A network and how it is taught, as one module. points, queries: of each cloud that are seen, and asked about."""
+    """A network and how it is taught, as one module. The network's config says how many points of a cloud it sees, the
+    lesson how many points of space are asked about."""
 
     network: nn.Module
-    points: int
-    queries: int
+    lesson: Lesson
 
     def forward(
         self,
@@ -82,9 +88,9 @@ class SolidTask:
     ) -> tuple[Tensor, dict[str, Tensor]]:
         """The loss of some clouds, and its terms."""
         device, rows = next(network.parameters()).device, torch.as_tensor(picks)
-        clouds = _some(self.train.points[rows], self.student.points, noise)
+        clouds = _some(self.train.points[rows], self.student.network.config.points, noise)
         queries = self.train.queries[rows].chunk(2, 1)
-        halves = [_some(half, self.student.queries // 2, noise) for half in queries]
+        halves = [_some(half, self.student.lesson.queries // 2, noise) for half in queries]
         inside = torch.cat([torch.ones(halves[0].shape[1]), torch.zeros(halves[1].shape[1])])
         asked = clouds.to(device), torch.cat(halves, 1).to(device), inside.to(device)
         return network(*asked, progress, noise)
@@ -97,7 +103,7 @@ class SolidTask:
         device = next(network.parameters()).device
         for start in range(0, len(self.other), PER_REPORT):
             some = self.other[start : start + PER_REPORT]
-            said = self.student.network(some.points[:, : self.student.points].float().to(device))
+            said = self.student.network(some.points.float().to(device))
             distances = said.distances(some.queries.float().to(device))
             inside = some.inside.bool().to(device)
             rows = {

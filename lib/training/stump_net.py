@@ -30,13 +30,14 @@ from .solids import Student
 PULLS = ("paper", "authors")
 CONNECTIONS = ("soft", "steeper", "straight_through")
 STEEP = 8.0  # of "steeper" connections, in the end
+LENGTHS = {"half", "radius"}  # of what a primitive is told by
 
 
 @dataclass(frozen=True)
 class Lesson:
     """How it is taught.
 
-    points, queries  of each cloud that are seen in a step, and asked about (half of these inside)
+    queries     of each cloud that are asked about in a step, half of them inside
     pull        "paper" or "authors": how the second term is meant; weight: what it is multiplied with
     connections one of CONNECTIONS, see above
     dullest     of the surfaces' sigmoid, at the beginning
@@ -44,7 +45,6 @@ class Lesson:
     Raises ValueError for other pulls and connections, and for numbers that make no sense.
     """
 
-    points: int = 256
     queries: int = 512
     pull: str = "paper"
     weight: float = 1e-3
@@ -60,14 +60,17 @@ class Lesson:
             raise ValueError(
                 f"found connections {self.connections!r}; expected one of {', '.join(CONNECTIONS)}"
             )
-        if not (self.points >= 1 and self.queries >= 2 and 0 <= self.weight < math.inf):
+        if not (self.queries >= 2 and 0 <= self.weight < math.inf):
             raise ValueError(
-                f"found {self.points} points, {self.queries} queries, weight {self.weight}; "
-                "expected at least 1, 2 and 0, and finite"
+                f"found {self.queries} queries, weight {self.weight}; expected at least 2 and 0, and finite"
             )
         if not 0 < self.dullest <= SHARPNESS:
             raise ValueError(f"found dullest {self.dullest:g}; expected more than 0, at most {SHARPNESS:g}")
-
+        if self.power is not None and self.temperature is not None:
+            raise ValueError(
+                f"found a power of {self.power:g} and a temperature of {self.temperature:g}; expected one of them, "
+                "the other None"
+            )
         if self.power is not None and not 0 < self.power <= HIGHEST:
             raise ValueError(f"found a power of {self.power:g}; expected more than 0, at most {HIGHEST:g}")
         if self.temperature is not None and not 0 < self.temperature <= STEEPEST:
@@ -90,26 +93,24 @@ class StumpStudent(Student):
     def __init__(self, network: StumpNet, lesson: Lesson):
         super().__init__()
         self.network, self.lesson = network, lesson
-        self.points, self.queries = lesson.points, lesson.queries
 
     def forward(self, clouds, asked, inside, progress, noise):
         """See Student; the terms are "reconstruction" and "pull"."""
         said = self.network(clouds)
         distances = said.distances(asked)
-        found = self.soft(said, distances, progress)
+        found = self._occupancy(said, distances, progress, self.lesson.connections == "straight_through")
         reconstruction, pull = (found - inside).square().mean(), pulled(distances, self.lesson.pull)
         return reconstruction + self.lesson.weight * pull, {"reconstruction": reconstruction, "pull": pull}
 
-    def soft(self, said, distances, progress=1.0):
-        """See Student; or as in another step."""
+    def soft(self, said, distances):
+        """See Student; soft with "straight_through", too."""
+        return self._occupancy(said, distances, 1.0, False)
+
+    def _occupancy(self, said, distances, progress, straight_through):
         lesson = self.lesson
+        steepness, sharpness = lesson.steepness(progress), lesson.sharpness(progress)
         return said.occupancy(
-            distances,
-            lesson.steepness(progress),
-            lesson.power,
-            lesson.temperature,
-            lesson.sharpness(progress),
-            lesson.connections == "straight_through",
+            distances, steepness, lesson.power, lesson.temperature, sharpness, straight_through
         )
 
     def figures(self, said):
@@ -125,12 +126,14 @@ def pulled(distances: Float[Tensor, "b k m"], pull: str) -> Float[Tensor, ""]:
 
 
 def use(said: SoftStump) -> dict[str, Float[Tensor, " b"]]:
-    """Of each stump: primitives and nodes that a decided one uses, mean size of the primitives, mean entropy of the
-    connections in bits."""
-    nodes = said.union > 0
-    primitives = ((said.intersection > 0) & nodes.unsqueeze(1)).any(2)
-    chances = torch.cat([each.flatten(1) for each in (said.intersection, said.union)], 1).sigmoid()
-    sizes = torch.cat([batch.sizes.flatten(1) for batch in said.primitives], 1)
+    """Of each stump: primitives and nodes that a decided one uses, mean size of the primitives (their half sides and
+    radii, no slopes or exponents), mean entropy of all connections, complements too, in bits."""
+    primitives, nodes = said.used()
+    chances = torch.cat([each.flatten(1) for each in said.logits], 1).sigmoid()
+    lengths = [getattr(batch, name) for batch in said.primitives for name in LENGTHS & batch.counts.keys()]
+    sizes = (
+        torch.cat([each.flatten(1) for each in lengths], 1) if lengths else chances[:, :1] * 0
+    )  # cones alone
     return {
         "primitives": primitives.sum(1),
         "nodes": nodes.sum(1),

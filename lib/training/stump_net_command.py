@@ -61,7 +61,7 @@ def job(options: argparse.Namespace) -> Job:
 
 def _config(options: argparse.Namespace) -> StumpNetConfig:
     sizes = (options.primitives, options.nodes)
-    given = {"head": options.head, "complement": not options.no_complement}
+    given = {"head": options.head, "complement": not options.no_complement, "points": options.points}
     if options.kinds:
         given["kinds"] = tuple(options.kinds)
     base = StumpNetConfig if options.paper else StumpNetConfig.compact
@@ -70,7 +70,7 @@ def _config(options: argparse.Namespace) -> StumpNetConfig:
 
 def _lesson(options: argparse.Namespace) -> Lesson:
     means = {"power": options.power} if options.power else {"power": None, "temperature": options.temperature}
-    names = ("points", "queries", "pull", "weight", "connections", "dullest")
+    names = ("queries", "pull", "weight", "connections", "dullest")
     return Lesson(**{name: getattr(options, name) for name in names}, **means)
 
 

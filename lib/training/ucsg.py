@@ -19,14 +19,13 @@ NARROW = 0.05  # margin below which choices are driven to be certain
 
 @dataclass(frozen=True)
 class UCSGLesson:
-    """points, queries: of each cloud that are seen in a step, and asked about. Raises ValueError for too few."""
+    """queries: of each cloud that are asked about in a step. Raises ValueError for too few."""
 
-    points: int = 256
     queries: int = 512
 
     def __post_init__(self) -> None:
-        if self.points < 1 or self.queries < 2:
-            raise ValueError(f"found {self.points} points, {self.queries} queries; expected at least 1 and 2")
+        if self.queries < 2:
+            raise ValueError(f"found {self.queries} queries; expected at least 2")
 
 
 class UCSGStudent(Student):
@@ -35,7 +34,6 @@ class UCSGStudent(Student):
     def __init__(self, network: UCSG, lesson: UCSGLesson):
         super().__init__()
         self.network, self.lesson = network, lesson
-        self.points, self.queries = lesson.points, lesson.queries
 
     def forward(self, clouds, asked, inside, progress, noise):
         """See Student."""

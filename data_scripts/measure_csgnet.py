@@ -200,6 +200,8 @@ def measure(options: argparse.Namespace) -> dict:
     paths = {"weights": options.weights or pretrained(f"csgnet_{options.dimensions}d")}
     if options.table in ("silhouettes", "logos"):
         paths["reinforced"] = options.reinforced or pretrained("csgnet_2d_reinforced")
+    elif options.reinforced:
+        raise DataError(f"found --reinforced for the table {options.table}; expected --weights")
     networks = [network_of(path, options.dimensions) for path in paths.values()]
     count = QUICK if options.quick else options.count or COUNTS[options.table, options.dimensions]
     if options.table == "synthetic":

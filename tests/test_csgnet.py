@@ -15,7 +15,7 @@ SIDE = 64
 CLOSE = 1e-5  # sums in another order, in float32
 SMALL = {
     2: CSGNetConfig(2, 9, (2, 3), (3, 4), (1, 4), (4, 1), "batch", 5, 7, 0.0, 4),
-    3: CSGNetConfig(3, 11, (2, 2), (8, 3), (8, 1), (1, 2), "group", 4, 6, 0.0),
+    3: CSGNetConfig(3, 11, (2, 2), (8, 3), (8, 1), (1, 2), "none", 4, 6, 0.0),
 }
 ONE = {"channels": (4,), "kernels": (3,), "strides": (1,), "pools": (2,)}  # lists of one convolution
 
@@ -142,7 +142,7 @@ def test_axes_of_a_canvas_are_not_mixed_up(network, canvases):
     assert not torch.allclose(network.begin(canvases).feature, network.begin(swapped).feature, atol=CLOSE)
 
 
-@pytest.mark.parametrize("norm, alone", [("group", True), ("none", True), ("batch", False)])
+@pytest.mark.parametrize("norm, alone", [("none", True), ("batch", False)])
 def test_only_batch_norm_looks_at_the_other_shapes(norm, alone):
     """In training; afterwards none does."""
     torch.manual_seed(0)
@@ -170,9 +170,18 @@ def test_what_is_dropped_does_not_reach_the_next_step():
 
 def test_dropout_is_in_encoder_and_decoder():
     with torch.device("meta"):
-        modules = CSGNet(CSGNetConfig.paper()).modules()
-    dropping = [each.p for each in modules if isinstance(each, torch.nn.Dropout)]
+        plane, space = (CSGNet(CSGNetConfig.paper(dimensions)) for dimensions in (2, 3))
+    dropping = [each.p for each in plane.modules() if isinstance(each, torch.nn.Dropout)]
     assert dropping == [0.2] * 4  # three convolutions; one module that the decoder uses twice
+    names = [[type(each).__name__ for each in network.encoder[:5]] for network in (plane, space)]
+    assert names[0] == ["Conv2d", "ReLU", "Dropout", "MaxPool2d", "Identity"]  # Table 6
+    assert names[1] == ["Conv3d", "ReLU", "MaxPool3d", "Dropout", "BatchNorm3d"]  # Table 8
+
+
+@pytest.mark.parametrize("before", [[[400, 401]], [[-1]], [[]], [[0], [0], [0]]])
+def test_tokens_that_are_none_are_refused(network, canvases, before):
+    with pytest.raises(ValueError, match="found tokens .*expected"):
+        network.advance(network.begin(canvases[:1]), torch.tensor(before, dtype=torch.long))
 
 
 def test_all_weights_are_moved(network, canvases):
@@ -237,7 +246,7 @@ def test_a_network_of_the_plane_refuses_grids_and_the_other_way_round(dimensions
         ({**ONE, "kernels": (3,), "strides": (2,)}, "even number"),
         ({**ONE, "pools": (3,)}, "divide 64"),
         ({**ONE, "strides": (128,), "kernels": (128,)}, "divide 64"),
-        ({"norm": "layer"}, "'layer'; expected one of none, batch, group"),
+        ({"norm": "layer"}, "'layer'; expected one of none, batch"),
         ({"dropout": 1.0}, "dropout of 1.0"),
         ({"dropout": -0.1}, "dropout of -0.1"),
     ],

@@ -32,7 +32,7 @@ from tests.conftest import unchecked
 ROOT = Path(__file__).parents[1]
 PLANE = vocabulary_of(2)
 TINY = CSGNetConfig(2, 400, (4,), (8,), (8,), (1,), "batch", embedding=8, hidden=16, dropout=0.0)
-TINY_3D = CSGNetConfig(3, 6635, (2,), (16,), (16,), (1,), "group", embedding=4, hidden=8, dropout=0.0)
+TINY_3D = CSGNetConfig(3, 6635, (2,), (16,), (16,), (1,), "none", embedding=4, hidden=8, dropout=0.0)
 TEXTS = {  # by length
     1: ["c(32,32,16)", "s(24,24,20)"],
     3: ["c(32,32,28)s(32,32,20)-", "c(16,16,8)t(40,40,12)+", "s(48,48,12)c(40,40,12)+"],
@@ -212,9 +212,10 @@ def test_the_report_scores_other_programs():
     answers = execute_many(write(task.module.network, images).tokens)
     assert answers.valid.all()
     assert found["val_cd"] == pytest.approx(image_chamfer(images, answers.images).mean().item(), rel=1e-5)
-    parts = [task.module(images[rows], other.tokens[rows]).item() for rows in (slice(100), slice(100, 120))]
-    assert found["val_loss"] == pytest.approx((100 * parts[0] + 20 * parts[1]) / 120, rel=1e-5)
-    assert set(found) == {"drawing_share", "val_loss", "val_cd"}
+    assert found["val_loss"] == pytest.approx(
+        task.module(images, other.tokens).item(), rel=1e-5
+    )  # all at once
+    assert set(found) == {"preparing_share", "drawing_share", "val_loss", "val_cd"}
 
 
 def test_the_report_in_space_tells_overlap():
@@ -224,7 +225,7 @@ def test_the_report_in_space_tells_overlap():
     grids = execute_many(other.tokens, other.vocabulary).grids
     answers = execute_many(write(task.module.network, grids).tokens, other.vocabulary).grids
     assert found["val_iou"] == pytest.approx(iou(grids, answers, dims=3).mean().item(), rel=1e-5)
-    assert set(found) == {"drawing_share", "val_loss", "val_iou"}
+    assert set(found) == {"preparing_share", "drawing_share", "val_loss", "val_iou"}
 
 
 def test_the_share_of_drawing_is_a_share_and_begins_anew(monkeypatch):
@@ -245,12 +246,20 @@ def test_the_share_of_drawing_is_a_share_and_begins_anew(monkeypatch):
         clock[0] += 1.0  # second of drawing
         return original(*arguments, **named)
 
+    def ponder(tokens):
+        clock[0] += 4.0  # seconds of finding out what is to be taught
+        return tokens
+
     monkeypatch.setattr("lib.training.csgnet.execute_many", slowly)
+    task.taught = ponder
     for _ in range(2):
         task.loss(network, range(4), noise(), 0.0)
-    assert task.report(task.module)["drawing_share"] == pytest.approx(2 / 8)
+    found = task.report(task.module)
+    assert (found["drawing_share"], found["preparing_share"]) == pytest.approx((2 / 16, 8 / 16))
+    task.started = clock[0] = 100.0
     task.loss(network, range(4), noise(), 0.0)
-    assert task.report(task.module)["drawing_share"] == pytest.approx(1 / 4)
+    found = task.report(task.module)
+    assert (found["drawing_share"], found["preparing_share"]) == pytest.approx((1 / 8, 4 / 8))
 
 
 # ---- learning ----
@@ -400,12 +409,18 @@ def test_the_seed_decides_and_nothing_else(small, tmp_path):
 @pytest.mark.parametrize(
     "options, told",
     [
-        (["--programs", "0"], "TrainingError: curriculum is 0.0, programs 0; expected"),
-        (["--curriculum", "1.5"], "TrainingError: curriculum is 1.5"),
-        (["--curriculum", "nan"], "TrainingError: curriculum is nan"),
-        (["--jitter", "1.5"], "TrainingError: jitter is 1.5; expected a share from 0 to 1, in space 0"),
-        (["--jitter", "nan"], "TrainingError: jitter is nan"),
-        (["--dimensions", "3", "--jitter", "0.5"], "TrainingError: jitter is 0.5"),
+        (["--programs", "0"], "TrainingError: found 0 programs, curriculum 0.0, jitter 0.0; expected"),
+        (["--curriculum", "1.5"], "TrainingError: found 12 programs, curriculum 1.5"),
+        (["--curriculum", "nan"], "TrainingError: found 12 programs, curriculum nan"),
+        (
+            ["--jitter", "1.5"],
+            "TrainingError: found 12 programs, curriculum 0.0, jitter 1.5; expected at least 1, and shares from 0 to 1",
+        ),
+        (
+            ["--jitter", "nan"],
+            "TrainingError: found 12 programs, curriculum 0.0, jitter nan; expected at least 1",
+        ),
+        (["--dimensions", "3", "--jitter", "0.5"], "TrainingError: found jitter 0.5 in space; expected 0"),
         (["--pruned", "-1"], "TrainingError: pruned is -1; expected 0 or 1"),
         (["--in_order", "2"], "TrainingError: in_order is 2; expected 0 or 1"),
         (["--sharing", "-1"], "TrainingError: sharing is -1; expected 0 or 1"),

@@ -106,7 +106,7 @@ STOPS = torch.full((2, 3, 5), PLANE.stop)
         (BLANK, STOPS[0], r"programs \(3, 5\); expected"),
         (BLANK[:, :32], STOPS, r"targets \(2, 32, 64\)"),
         (BLANK[0], STOPS, r"targets \(64, 64\)"),
-        (BLANK.tolist(), STOPS, r"targets \(\)"),
+        (BLANK.tolist(), STOPS, "targets in a list and programs in a Tensor"),
         (BLANK, STOPS[:, :0], "found 0 programs for each target"),
         (BLANK.float(), STOPS, "has to be bool"),
     ],

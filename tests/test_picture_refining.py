@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from lib.finding.picture_numbers import CENTERS, SIZES, numbered
+from lib.finding.picture_numbers import LEAST, MOST, numbered
 from lib.finding.picture_powell import refine_by_powell
 from lib.finding.picture_refining import refine
 from lib.finding.picture_targets import targets_of
@@ -63,7 +63,7 @@ def displaced(program: Program, rng: np.random.Generator, most: int) -> Program:
     """Every number changed by up to `most` pixels, within the range of refinement."""
     numbers = program.parameters().view(-1, 3)
     moved = numbers + torch.from_numpy(rng.integers(-most, most + 1, tuple(numbers.shape)))
-    return program.with_parameters(numbered([program]).limited(moved).flatten())
+    return program.with_parameters(moved.maximum(LEAST).minimum(MOST).flatten())
 
 
 # Programs as tensors
@@ -105,9 +105,11 @@ def test_what_a_place_is_made_of():
 
 
 def test_limits():
-    now = numbered([CIRCLE])
-    numbers = torch.tensor([[-3, 70, 2], [8, 56, 32], [7, 57, 33], [30, 31, 64]])
-    assert now.limited(numbers).tolist() == [[8, 56, 8], [8, 56, 32], [8, 56, 32], [30, 31, 32]]
+    numbers = torch.tensor([[-3, 70, 2], [8, 56, 32], [7, 57, 33], [30, 31, 64]]).view(1, 4, 1, 3)
+    found = numbered([CIRCLE]).limited(numbers)
+    assert found.flatten(0, 2).tolist() == [[8, 56, 8], [8, 56, 32], [8, 56, 32], [30, 31, 32]]
+    found = numbered([parse("c(3,60,40)")]).limited(numbers)  # it may stay where it is, beyond the limits
+    assert found.flatten(0, 2).tolist() == [[3, 60, 8], [8, 56, 32], [7, 57, 33], [30, 31, 40]]
 
 
 @pytest.mark.parametrize("wrong", ["c(32,32,16)", parse("sp(32,32,32,16)"), None, torch.tensor([0, 399])])
@@ -161,8 +163,7 @@ def test_structure_and_kinds_stay(refined, starts):
 
 def test_numbers_stay_in_range(refined):
     numbers = torch.cat([program.parameters().view(-1, 3) for program in refined.programs])
-    assert numbers[:, :2].min() >= CENTERS[0] and numbers[:, :2].max() <= CENTERS[1]
-    assert numbers[:, 2].min() >= SIZES[0] and numbers[:, 2].max() <= SIZES[1]
+    assert (numbers >= LEAST).all() and (numbers <= MOST).all()
 
 
 def test_distances_are_those_of_the_programs(refined, starts, targets):
@@ -236,6 +237,35 @@ def test_numbers_off_the_range_are_allowed_at_the_start(programs, unchecked_shap
     assert [p.structure for p in found.programs] == [p.structure for p in programs[:16]]
 
 
+@pytest.mark.parametrize(
+    "start, target, powells",
+    [
+        ("c(32,32,40)c(32,32,8)-", "c(32,32,40)c(36,32,8)-", 0),  # a radius above the networks' 32
+        ("c(4,32,12)s(40,40,12)+", "c(4,32,12)s(43,40,12)+", 0),  # a center left of their 8
+        ("c(20,20,3)c(44,44,20)+", "c(20,20,3)c(44,40,20)+", 0),  # a radius below their 8
+    ],
+)
+def test_what_is_off_the_range_stays_while_the_rest_moves(start, target, powells, unchecked_shapes):
+    picture = images_of([parse(target)])
+    found = refine([parse(start)], picture)
+    assert found.distances[0, 0] > 0.3 and found.distances[-1, 0] == 0
+    assert found.programs == [parse(target)]
+    better, distances = refine_by_powell(parse(start), picture[0])
+    assert distances[-1] == powells and better.statements[0] == parse(target).statements[0]
+
+
+def test_what_is_no_list_of_programs_or_no_image_is_refused():
+    picture = images_of([CIRCLE])
+    for programs, targets in (((CIRCLE), picture), ([CIRCLE], None), ([CIRCLE], picture.numpy())):
+        with unchecked(), pytest.raises(ValueError, match="expected"):
+            refine(programs, targets)
+    for target in (None, [1], picture, picture[0].float()):
+        with unchecked(), pytest.raises(ValueError, match=r"expected a bool tensor \(64, 64\)"):
+            refine_by_powell(CIRCLE, target)
+    with unchecked(), pytest.raises(ValueError, match="found 1.5 sweeps"):
+        refine([CIRCLE], picture, 1.5)
+
+
 @pytest.mark.parametrize("fill", [False, True])
 def test_a_blank_or_full_target_is_16_px_from_everything(fill):
     found = refine([CIRCLE], torch.full((1, 64, 64), fill))
@@ -260,11 +290,11 @@ ONE = images_of([CIRCLE])
     "arguments, message",
     [
         (([CIRCLE] * 2, ONE), "found 2 programs and 1 targets"),
-        (([CIRCLE], ONE[0]), "found 1 programs and 64 targets"),
-        (([CIRCLE], ONE[:, :32]), r"found images \(1, 32, 64\)"),
-        (([CIRCLE], ONE[None]), r"found images \(1, 1, 64, 64\)"),
-        (([CIRCLE], ONE.float()), "has to be bool"),
-        (([CIRCLE], ONE.tolist()), "found a list"),
+        (([CIRCLE], ONE[0]), r"\(64, 64\); expected a bool tensor \(n, 64, 64\)"),
+        (([CIRCLE], ONE[:, :32]), r"found images torch.bool \(1, 32, 64\)"),
+        (([CIRCLE], ONE[None]), r"found images torch.bool \(1, 1, 64, 64\)"),
+        (([CIRCLE], ONE.float()), "found images torch.float32"),
+        (([CIRCLE], ONE.tolist()), "found images list"),
         (([CIRCLE], ONE, -1), "found -1 sweeps"),
     ],
 )
@@ -303,9 +333,9 @@ def test_powell_finds_one_primitive(unchecked_shapes):
     "arguments, message",
     [
         ((CIRCLE, ONE[0], -1), "found -1 iterations"),
-        ((CIRCLE, ONE[0].float()), "has to be bool"),
-        ((CIRCLE, ONE[0, :32]), "have to have one shape"),
-        ((CIRCLE, ONE), "have to have one shape"),
+        ((CIRCLE, ONE[0].float()), r"torch.float32 \(64, 64\); expected a bool tensor"),
+        ((CIRCLE, ONE[0, :32]), r"found images torch.bool \(32, 64\)"),
+        ((CIRCLE, ONE), r"found images torch.bool \(1, 64, 64\)"),
     ],
 )
 def test_powell_names_what_does_not_fit(arguments, message):
@@ -323,5 +353,6 @@ def test_coordinate_search_comes_at_least_as_near_as_powell(targets, unchecked_s
 def test_the_vocabulary_s_range_is_the_range_of_refinement():
     """Every primitive of the networks' vocabulary is within the limits, and the limits are reached."""
     numbers = torch.tensor([primitive.numbers for primitive in vocabulary_of(2).primitives])
-    assert (numbers[:, 0].min(), numbers[:, 0].max()) == CENTERS
-    assert (numbers[:, 2].min(), numbers[:, 2].max()) == SIZES
+    assert torch.equal(numbers.amin(0)[[0, 2]], LEAST[[0, 2]]) and torch.equal(
+        numbers.amax(0)[[0, 2]], MOST[[0, 2]]
+    )

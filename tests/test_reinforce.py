@@ -31,7 +31,7 @@ from tests.csgnets import all_programs, allowed_next, random_network
 ROOT = Path(__file__).parents[1]
 PLANE = vocabulary_of(2)
 TINY = CSGNetConfig(2, 400, (4,), (8,), (8,), (1,), "batch", embedding=8, hidden=16, dropout=0.0)
-TINY_3D = CSGNetConfig(3, 6635, (2,), (16,), (16,), (1,), "group", embedding=4, hidden=8, dropout=0.0)
+TINY_3D = CSGNetConfig(3, 6635, (2,), (16,), (16,), (1,), "none", embedding=4, hidden=8, dropout=0.0)
 
 
 @pytest.fixture(autouse=True)
@@ -401,6 +401,12 @@ def test_the_papers_settings(small, tmp_path):
         "last": 1,
     }
     assert {name: settings[name] for name in expected} == expected
+
+
+def test_the_papers_settings_are_for_the_papers_network(small, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(CSGNetConfig, "paper", lambda dimensions: replace(TINY, hidden=TINY.hidden + 1))
+    assert train("--paper", "--epochs", 1, "--out", tmp_path) == 1
+    assert "found weights of other sizes than the paper's; expected, with --paper" in capsys.readouterr().err
 
 
 def test_from_scratch(small, tmp_path):

@@ -10,11 +10,11 @@ from torch import Tensor
 from ..interpreters.csg import OPERATIONS, Picture, Program, ProgramError, execute, parse, vocabulary_of
 from ..interpreters.csg.vocabulary import WORDS
 from ..metrics.images import iou
+from ..models.csgnet_grammar import LONGEST
 from . import OK, UNANSWERED, hint
 
 LARGE = 3600  # pixels of exercise 8.2; the most that five tokens can switch on is 3,653
 ALIKE = 0.95  # intersection over union of exercise 8.4
-LONGEST = 13  # tokens that a network may write
 LONG_WINDED = "c(24,32,20)c(24,32,12)+s(40,40,16)+s(40,40,16)c(40,40,8)+c(48,48,8)s(40,40,16)*+-"
 _HOUSE = "s(32,40,24)t(32,24,24)+s(32,48,12)-c(32,24,8)-"
 _WRITTEN = {"primitive": ("c(32,32,16)", "s(24,40,12)", "t(32,24,20)"), "operation": tuple(OPERATIONS)}
@@ -92,8 +92,8 @@ def check_house(answer: object) -> str:
     picture = _picture(answer)
     if isinstance(picture, str):
         return picture
-    if len(picture.program) > LONGEST:
-        return hint(f"{len(picture.program)} tokens; a network may write {LONGEST}")
+    if len(picture.program) > LONGEST[2]:
+        return hint(f"{len(picture.program)} tokens; a network may write {LONGEST[2]}")
     overlap = iou(picture.image, house()).item()
     wanted = f"{ALIKE:g} will do"
     return OK if overlap >= ALIKE else hint(f"intersection over union is {overlap:.3f}, {wanted}")

@@ -9,13 +9,14 @@ from torch import Tensor
 
 from ..interpreters.csg import Program, ProgramError, execute, parse
 from ..metrics.images import IMAGE_DIAGONAL, image_chamfer
+from ..models.csgnet_grammar import LONGEST
 from . import OK, UNANSWERED, hint
 
 REWARDS, SURE = (0.3, 0.7), 0.8  # exercises 10.1 and 10.2: what the arms pay, and the probability of arm 1
 NEAR = 1e-3  # of their numbers
 DISTANCE, SHARE = 4.0, 0.1  # exercise 10.4: px, and what is left of the reward there
 PERCENT = 0.02  # relative error of its answer that is allowed
-LONGEST, CLOSE = 13, 0.5  # exercise 10.5: tokens, and px to the target
+CLOSE = 0.5  # exercise 10.5: px to the target
 
 
 def arrow() -> Bool[Tensor, "64 64"]:
@@ -122,8 +123,8 @@ def check_arrow(answer: object) -> str:
         program = answer if isinstance(answer, Program) else parse(answer)
         if program.dimensions != 2:
             return hint("this is a program of space; write one of the plane, with c, s and t")
-        if len(program) > LONGEST:
-            return hint(f"{len(program)} tokens; a network may write {LONGEST}")
+        if len(program) > LONGEST[2]:
+            return hint(f"{len(program)} tokens; a network may write {LONGEST[2]}")
         image = execute(program).image
     except ProgramError as error:
         return hint(str(error)[:300])

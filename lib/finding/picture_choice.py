@@ -37,10 +37,15 @@ def best_of(targets: Bool[Tensor, "n *canvas"], tokens: Int[Tensor, "n k length"
     Of equal ones the first. Raises ValueError where these are not k programs, one or more, for each target, and for
     targets that are not bool; ProgramError, which is one, for numbers that are no tokens.
     """
-    canvases, programs = (tuple(getattr(each, "shape", ())) for each in (targets, tokens))
+    tensors = isinstance(targets, Tensor) and isinstance(tokens, Tensor)
+    canvases, programs = (tuple(each.shape) if tensors else () for each in (targets, tokens))
     if canvases[1:] not in ((SIDE,) * 2, (SIDE,) * 3) or len(programs) != 3 or programs[0] != canvases[0]:
         found = f"targets {canvases} and programs {programs}"
-        raise ValueError(f"found {found}; expected (n, 64, 64) or (n, 64, 64, 64), and (n, k, length)")
+        if not tensors:
+            found = f"targets in a {type(targets).__name__} and programs in a {type(tokens).__name__}"
+        raise ValueError(
+            f"found {found}; expected tensors (n, 64, 64) or (n, 64, 64, 64), and (n, k, length)"
+        )
     if not programs[1]:
         raise ValueError("found 0 programs for each target; expected 1 or more")
     dimensions = targets.ndim - 1

@@ -15,7 +15,7 @@ from lib.interpreters.quoting import quoted
 
 KINDS = "cst"  # circle, square, triangle
 OPERATIONS = "+*-"
-CENTERS, SIZES = (8, 56), (8, 32)  # what numbers may be: the range of the networks' vocabulary
+LEAST, MOST = torch.tensor([8, 8, 8]), torch.tensor([56, 56, 32])  # x, y, r in the networks' vocabulary
 DIGITS = torch.tensor([2**14, 2**7, 1])  # a primitive's numbers as one number, which is quick to sort
 
 
@@ -39,9 +39,10 @@ class NumberedPrograms:
             *(each[which] for each in (self.tokens, self.kinds, self.below, self.numbers))
         )
 
-    def limited(self, numbers: Int[Tensor, "*n 3"]) -> Int[Tensor, "*n 3"]:
-        """The nearest numbers that are allowed."""
-        return torch.cat([numbers[..., :2].clamp(*CENTERS), numbers[..., 2:].clamp(*SIZES)], -1)
+    def limited(self, numbers: Int[Tensor, "n moves primitives 3"]) -> Int[Tensor, "n moves primitives 3"]:
+        """The nearest numbers that are allowed: the vocabulary's range, wider where an own number is beyond."""
+        own = self.numbers.unsqueeze(1)
+        return numbers.maximum(own.minimum(LEAST)).minimum(own.maximum(MOST))
 
     def words(self) -> Int[Tensor, "n 64"]:
         """The packed pictures. Each different primitive is drawn once."""

@@ -13,10 +13,12 @@ from jaxtyping import Bool
 from scipy.optimize import minimize
 from torch import Tensor
 
+from lib.interpreters.checks import whole
 from lib.interpreters.csg import Program
 from lib.metrics.images import image_chamfer
 
 from .picture_numbers import numbered
+from .picture_targets import check_images
 
 TOLERANCE = 1e-4  # the authors'
 
@@ -30,10 +32,10 @@ def refine_by_powell(
     Raises ProgramError for what is no Program of the plane, ValueError for a target that is no bool image and for less
     than 0 iterations.
     """
-    if iterations is not None and iterations < 0:
+    if iterations is not None and (whole(iterations) is None or iterations < 0):
         raise ValueError(f"found {iterations} iterations; expected 0 or more, or None")
-    start = numbered([program])
-    first = image_chamfer(target[None], start.images()).item()
+    start, target = numbered([program]), check_images(target, 2)[None]
+    first = image_chamfer(target, start.images()).item()
     if iterations == 0:  # SciPy would make one
         return program, [first]
     # What the search has met: its own answer may lie between two steps of the landscape.
@@ -42,8 +44,8 @@ def refine_by_powell(
 
     def distance(vector: np.ndarray) -> float:
         numbers = torch.from_numpy(np.trunc(vector).astype(np.int64)).view(start.numbers.shape)
-        tried = replace(start, numbers=start.limited(numbers))
-        found = image_chamfer(target[None], tried.images()).item()
+        tried = replace(start, numbers=start.limited(numbers.unsqueeze(1)).squeeze(1))
+        found = image_chamfer(target, tried.images()).item()
         if found < best[0]:
             best[:] = found, tried
         return found

@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from tqdm import tqdm
 
+from lib.interpreters.checks import whole
 from lib.interpreters.csg import Program
 from lib.interpreters.csg.packing import unpack
 from lib.interpreters.threads import one_thread
@@ -51,16 +52,19 @@ def refine(
 ) -> Refined:
     """Coordinate search on the centers and sizes of programs of the plane.
 
-    Centers stay in 8..56 and sizes in 8..32, as in the networks' vocabulary, but at every whole number.
-    sweeps  how many at most; None: until none is better
+    Centers stay in 8..56 and sizes in 8..32, as in the networks' vocabulary, but at every whole number; a number that
+    is beyond goes no farther.
+    sweeps  how many at most; None: until none is better, or 100
     Works on the CPU. Raises ProgramError for what are no Programs of the plane, ValueError where these and the targets
-    are not equally many, and for targets that are no bool images.
+    are not equally many, for targets that are no bool images, and for other sweeps.
     """
-    if len(programs) != len(targets):
+    known = targets_of(targets)
+    if not isinstance(programs, Sequence) or len(programs) != len(targets):
+        programs = programs if isinstance(programs, Sequence) else ["one that is in no list"]
         raise ValueError(f"found {len(programs)} programs and {len(targets)} targets; expected one for each")
-    if sweeps is not None and sweeps < 0:
+    if sweeps is not None and (whole(sweeps) is None or sweeps < 0):
         raise ValueError(f"found {sweeps} sweeps; expected 0 or more, or None")
-    now, known = numbered(programs), targets_of(targets)
+    now = numbered(programs)
     active = torch.arange(len(programs))
     distances, history = [known.chamfer(active, now.images())], [now.numbers]
     bar = tqdm(range(MOST_SWEEPS if sweeps is None else sweeps), desc="refining", leave=False, disable=None)

@@ -48,10 +48,21 @@ def targets_of(images: Bool[Tensor, "n 64 64"]) -> Targets:
 
     Raises ValueError for anything but bool images of 64 x 64 pixels.
     """
-    outlines = edge_map(images).cpu()
-    if outlines.shape[1:] != (SIDE, SIDE):
-        raise ValueError(f"found images {tuple(outlines.shape)}; expected (n, 64, 64)")
+    outlines = edge_map(check_images(images, 3)).cpu()
     return Targets(outlines, distance_transform(outlines) if len(images) else torch.zeros(images.shape))
+
+
+def check_images(images: object, axes: int) -> Tensor:
+    """The same: bool images of 64 x 64 pixels, (n, 64, 64) or one alone, (64, 64). Raises ValueError for all else."""
+    right = isinstance(images, Tensor) and images.dtype == torch.bool and images.ndim == axes
+    if not right or images.shape[-2:] != (SIDE, SIDE):
+        found = (
+            f"{images.dtype} {tuple(images.shape)}" if isinstance(images, Tensor) else type(images).__name__
+        )
+        raise ValueError(
+            f"found images {found}; expected a bool tensor {'(n, 64, 64)' if axes == 3 else '(64, 64)'}"
+        )
+    return images
 
 
 def _means(distance: Float[Tensor, " pixels"], image: Int[Tensor, " pixels"], n: int) -> Float[Tensor, " n"]:

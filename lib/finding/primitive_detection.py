@@ -43,6 +43,9 @@ def detection_precision(
 
 
 def _check(beams: Tensor, truth: Tensor, vocabulary: Vocabulary) -> None:
+    if not (isinstance(beams, Tensor) and isinstance(truth, Tensor)):
+        found = f"a {type(beams).__name__} and a {type(truth).__name__}"
+        raise ValueError(f"found {found}; expected tensors of tokens")
     if beams.ndim != 3 or not beams.shape[1] or truth.ndim != 2 or len(beams) != len(truth):
         found = f"programs {tuple(beams.shape)} and true ones {tuple(truth.shape)}"
         raise ValueError(f"found {found}; expected (n, k, length) and (n, length)")

@@ -6,7 +6,8 @@
 
 (Sharma et al. 2018, section 3 and Tables 6 to 9.) Plane and space differ by their config alone. The feature is the same
 at every token, so its share of the GRU's input is computed once a shape: the same numbers as with the paper's
-concatenation, at a third of the work. START, what comes before the first token, is the embedding after all others.
+concatenation, at half to two thirds of the work. START, what comes before the first token, is the embedding after all
+others.
 """
 
 from dataclasses import dataclass
@@ -16,9 +17,9 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from ..interpreters.csg import vocabulary_of
+from ..interpreters.csg.packing import SIDE
 
-SIDE = 64  # pixels or voxels along each side of a canvas
-NORMS = ("none", "batch", "group")
+NORMS = ("none", "batch")
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,7 @@ class CSGNetConfig:
     tokens      of the vocabulary, `$` included
     channels    of each convolution, the first one's first; after it comes ReLU
     kernels     their widths; strides: how far they move; pools: how many outputs along each side become one, by maximum
-    norm        what comes after each convolution and pooling: "none", "batch" (paper, in space), or "group", which
-                scales each shape by its own mean and spread, so that others of its batch do not matter
+    norm        what comes after each convolution and pooling: "none", or "batch" (paper, in space)
     embedding, hidden   widths of what stands for a token, and of the GRU
     dropout     share of the values that are dropped in training: after convolutions, GRU and linear layer
     head        width of the layer between GRU and scores; None: that of the GRU (paper)
@@ -171,7 +171,16 @@ class CSGNet(nn.Module):
     def advance(
         self, state: State, before: Int[Tensor, "rows steps"]
     ) -> tuple[Float[Tensor, "rows steps tokens"], State]:
-        """Scores (logits) of what comes after each of some tokens, and the state after the last."""
+        """Scores (logits) of what comes after each of some tokens, and the state after the last.
+
+        before  tokens 0 to START, at least one a row. Raises ValueError for others.
+        """
+        steps = before.shape[1:]
+        if len(before) != len(state.feature) or len(steps) != 1 or not steps[0]:
+            found = f"tokens {tuple(before.shape)} for {len(state.feature)} shapes"
+            raise ValueError(f"found {found}; expected as many rows, and one token or more in each")
+        if len(before) and not 0 <= before.min() <= before.max() <= self.start:
+            raise ValueError(f"found tokens {before.min()} to {before.max()}; expected 0 to {self.start}")
         weight = self.gru.weight_ih[:, self.config.feature :]
         # A token's share of the gates: computed for each token of the vocabulary, or for each that is given, whichever
         # are fewer.
@@ -197,25 +206,32 @@ class CSGNet(nn.Module):
     def forward(
         self, canvases: Bool[Tensor, "rows *canvas"], tokens: Int[Tensor, "rows steps"]
     ) -> Float[Tensor, "rows steps tokens"]:
-        """Scores of every token of known programs, each given those before it (teacher forcing)."""
+        """Scores of every token of known programs, each given those before it (teacher forcing).
+
+        Raises ValueError as `begin` and `advance` do.
+        """
         before = torch.cat([torch.full_like(tokens[:, :1], self.start), tokens[:, :-1]], 1)
         return self.advance(self.begin(canvases), before)[0]
 
 
 def _encoder(config: CSGNetConfig) -> nn.Sequential:
-    """Convolution, ReLU, pooling, dropout and norm, as often as there are channels."""
+    """Convolution, ReLU, dropout, pooling and norm, as often as there are channels; in space pooling before dropout.
+
+    So they stand in Tables 6 and 8.
+    """
     plane = config.dimensions == 2
     convolution, pooling, batch_norm = (
         (nn.Conv2d, nn.MaxPool2d, nn.BatchNorm2d) if plane else (nn.Conv3d, nn.MaxPool3d, nn.BatchNorm3d)
     )
-    norms = {"none": nn.Identity, "batch": batch_norm, "group": lambda channels: nn.GroupNorm(1, channels)}
+    norms = {"none": nn.Identity, "batch": batch_norm}
     layers: list[nn.Module] = []
     inner = 1
     for channels, (kernel, stride), pool in zip(config.channels, config.windows, config.pools):
         padding = "same" if stride == 1 else (kernel - stride) // 2
         layers += [convolution(inner, channels, kernel, stride, padding), nn.ReLU()]
-        layers += [pooling(pool)] if pool > 1 else []
-        layers += [nn.Dropout(config.dropout)] if config.dropout else []
+        reduced = [pooling(pool)] if pool > 1 else []
+        dropped = [nn.Dropout(config.dropout)] if config.dropout else []
+        layers += dropped + reduced if plane else reduced + dropped
         layers += [norms[config.norm](channels)]
         inner = channels
     return nn.Sequential(*layers)

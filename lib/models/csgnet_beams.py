@@ -16,6 +16,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
+from ..interpreters.checks import whole
 from .csgnet import CSGNet, State
 from .csgnet_decoding import log_odds
 from .csgnet_grammar import LONGEST, OPERATIONS, allowed, deeper
@@ -76,7 +77,7 @@ def beam_search(
     Raises ValueError for less than one program or token, and for canvases that the network does not take.
     """
     longest = LONGEST[network.config.dimensions] if longest is None else longest
-    if k < 1 or longest < 1:
+    if None in (whole(k), whole(longest)) or k < 1 or longest < 1:
         raise ValueError(f"found {k} programs of {longest} tokens; expected at least one of each")
     state, search = network.begin(canvases), _start(network, canvases, k)
     stacks: list[list[Stack]] = [[()] * k for _ in range(len(canvases))]

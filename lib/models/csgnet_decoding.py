@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from ..interpreters.checks import whole
 from .csgnet import CSGNet
 from .csgnet_grammar import LONGEST, allowed, deeper
 
@@ -36,10 +37,13 @@ def write(
     noise     a generator on the CPU, from which tokens are drawn; without it each is the likeliest one
     longest   tokens of a program, `$` not counted: the paper's, if not given
     grammar   only programs that can be executed; without it the network may write anything, as in the paper
-    Raises ValueError for less than one copy or token, and for canvases that the network does not take.
+    Raises ValueError for less than one copy or token, for noise that is no generator, and for canvases that the network
+    does not take.
     """
+    if not isinstance(noise, torch.Generator | None):
+        raise ValueError(f"found noise {noise!r}; expected a torch.Generator, or None")
     longest = LONGEST[network.config.dimensions] if longest is None else longest
-    if copies < 1 or longest < 1:
+    if None in (whole(copies), whole(longest)) or copies < 1 or longest < 1:
         raise ValueError(f"found {copies} copies of {longest} tokens; expected at least one of each")
     shape = torch.arange(len(canvases), device=canvases.device).repeat_interleave(copies)
     state = network.begin(canvases)[shape]

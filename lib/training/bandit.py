@@ -12,9 +12,10 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from .reinforce import AVERAGING
+
 Rewards = tuple[float, float]  # of arm 0 and of arm 1
 BASELINES = ("none", "running")
-AVERAGING = 0.9  # share of the past in the running average of rewards, as for CSGNet
 
 
 def exact_gradient(theta: Float[Tensor, "*n"], rewards: Rewards) -> Float[Tensor, "*n"]:

@@ -36,7 +36,8 @@ PRECISIONS = ("32-true", "bf16-mixed")  # as Lightning Fabric names them
 
 @dataclass(frozen=True)
 class Setting:
-    """A number of a training: its value here, and that of the paper (`--paper`)."""
+    """A number of a training: its value here, and the paper's (`--paper`); or, where the paper has none, that of the
+    authors' program, or one that changes nothing."""
 
     name: str
     kind: type
@@ -115,7 +116,9 @@ def _parser(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         for each in command.settings:
             told = f"{each.about} (default {each.ours:g}; with --paper {each.papers:g})"
             one.add_argument(f"--{each.name}", type=each.kind, metavar="N", help=told)
-        one.add_argument("--paper", action="store_true", help="the paper's settings, where none is given")
+        one.add_argument(
+            "--paper", action="store_true", help="the paper's sizes and settings, where none is given"
+        )
         one.add_argument("--seed", type=int, default=0, help="of everything random (default 0)")
         one.add_argument("--out", type=Path, help="folder of the run (default: below runs/)")
         one.add_argument("--threads", type=int, default=1, help="CPU threads a process (default 1)")

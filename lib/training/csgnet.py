@@ -1,7 +1,8 @@
 """What CSGNet learns with a teacher: the programs of pictures that were drawn from random programs (paper, eq. 1).
 
 Pictures are drawn while it learns, a batch at a time, so that a data set is a list of tokens. An epoch is a number of
-programs drawn from that list, by chance and with repetitions. The log says what share of its time went into drawing.
+programs drawn from that list, by chance and with repetitions. The log says what share of its time went into finding
+out which parts of a program are needed and in which order they are taught, and what share into drawing and jitter.
 """
 
 import time
@@ -50,6 +51,7 @@ class Lessons:
     pruned      teach programs without parts that their pictures do not need, see interpreters.csg.pruning
     in_order    of the ways to say a program teach one, see interpreters.csg.ordering
     jitter      share of the pictures that are moved and stretched a little, see csgnet_jitter; of the plane only
+    Raises ValueError for less than one program, and for shares that are not from 0 to 1.
     """
 
     programs: int
@@ -58,12 +60,20 @@ class Lessons:
     in_order: bool = True
     jitter: float = 0.0
 
+    def __post_init__(self) -> None:
+        if self.programs < 1 or not (0 <= self.curriculum <= 1 and 0 <= self.jitter <= 1):
+            raise ValueError(
+                f"found {self.programs} programs, curriculum {self.curriculum}, jitter {self.jitter}; expected at "
+                "least 1, and shares from 0 to 1"
+            )
+
 
 @dataclass
 class ParseTask:
     """Learn programs of `train`; those of `other` are scored after every epoch. A `Task` for `lib.training.loop.fit`.
 
-    about: JSON, data and settings that must be the same when a run goes on
+    about: JSON, data and settings that must be the same when a run goes on. Raises ValueError for no programs, for
+    others of another vocabulary, for a curriculum of programs that are not sorted by length, and for jitter in space.
     """
 
     module: Teacher
@@ -71,12 +81,22 @@ class ParseTask:
     other: TokenSet
     lessons: Lessons
     about: dict
-    drawing: float = field(default=0.0, init=False)  # seconds since the last report
+    preparing: float = field(default=0.0, init=False)  # seconds since the last report
+    drawing: float = field(default=0.0, init=False)
     started: float = field(default_factory=time.perf_counter, init=False)
 
     def __post_init__(self) -> None:
-        stop = self.train.vocabulary.stop
-        self._lengths = (self.train.tokens != stop).sum(1)  # sorted: shorter programs come first
+        words = self.train.vocabulary
+        if not len(self.train) or not len(self.other) or self.other.vocabulary.dimensions != words.dimensions:
+            found = f"{len(self.train)} programs to learn, {len(self.other)} to test"
+            raise ValueError(f"found {found}; expected some of both, of one vocabulary")
+        if self.lessons.jitter and words.dimensions != 2:
+            raise ValueError(f"found jitter {self.lessons.jitter} in space; expected 0")
+        self._lengths = (self.train.tokens != words.stop).sum(1)
+        if self.lessons.curriculum and (self._lengths.diff() < 0).any():
+            raise ValueError(
+                "found a longer program before a shorter one; a curriculum expects the shorter ones first"
+            )
 
     @property
     def network(self) -> nn.Module:
@@ -92,11 +112,13 @@ class ParseTask:
         tokens = self.train.tokens[torch.randint(self.shown(progress), (len(picks),), generator=noise)]
         start = time.perf_counter()
         tokens = self.taught(tokens)
+        ready = time.perf_counter()
         device = next(network.parameters()).device
         canvases = drawn(tokens, self.train, device)
         if self.lessons.jitter:
             canvases = jittered(canvases, self.lessons.jitter, noise)
-        self.drawing += time.perf_counter() - start
+        self.preparing += ready - start
+        self.drawing += time.perf_counter() - ready
         return network(canvases, tokens.to(device)), {}
 
     def taught(self, tokens: Int[Tensor, "rows length"]) -> Int[Tensor, "rows length"]:
@@ -122,24 +144,29 @@ class ParseTask:
 
     @torch.no_grad()
     def report(self, network: nn.Module) -> dict[str, float]:
-        """Share of drawing in the time since the last report; of the other programs the loss, and how alike the shape
-        that the network writes (greedy) is to the one it sees: Chamfer distance, px, or in space IoU, both means."""
+        """Shares of the time since the last report; of the other programs the loss, a mean over all their tokens, and
+        how alike the shape that the network writes (greedy) is to the one it sees: Chamfer distance, px, or in space
+        IoU, a mean over programs."""
         seconds = time.perf_counter() - self.started
-        found = {"drawing_share": min(1.0, self.drawing / seconds)}
+        found = {
+            f"{name}_share": min(1.0, getattr(self, name) / seconds) for name in ("preparing", "drawing")
+        }
         device = next(network.parameters()).device
         sums = {"val_loss": 0.0, "val_cd" if self.other.vocabulary.dimensions == 2 else "val_iou": 0.0}
-        likeness = list(sums)[1]
+        likeness, asked = list(sums)[1], 0
         for start in range(0, len(self.other), PER_REPORT):
             tokens = self.taught(self.other.tokens[start : start + PER_REPORT])
             canvases = drawn(tokens, self.other, device)
-            sums["val_loss"] += network(canvases, tokens.to(device)).item() * len(tokens)
+            count = int((tokens != self.other.vocabulary.stop).sum()) + len(tokens)  # each ends with one `$`
+            sums["val_loss"] += network(canvases, tokens.to(device)).item() * count
+            asked += count
             answers = drawn(write(self.module.network, canvases).tokens, self.other, device)
             score = (
                 image_chamfer(canvases, answers) if likeness == "val_cd" else iou(canvases, answers, dims=3)
             )
             sums[likeness] += score.sum().item()
-        self.drawing, self.started = 0.0, time.perf_counter()
-        return found | {name: value / len(self.other) for name, value in sums.items()}
+        self.preparing, self.drawing, self.started = 0.0, 0.0, time.perf_counter()
+        return found | {"val_loss": sums["val_loss"] / asked, likeness: sums[likeness] / len(self.other)}
 
 
 def drawn(

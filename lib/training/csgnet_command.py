@@ -76,13 +76,8 @@ def folder(options: argparse.Namespace) -> Path:
 
 def job(options: argparse.Namespace) -> Job:
     """CSGNet on the training programs; some of validation are scored after every epoch."""
-    if not 0 <= options.curriculum <= 1 or not 1 <= options.programs <= MOST:
-        raise TrainingError(
-            f"curriculum is {options.curriculum}, programs {options.programs}; "
-            f"expected a share from 0 to 1, and 1 to {MOST}"
-        )
-    if not 0 <= options.jitter <= (1 if options.dimensions == 2 else 0):
-        raise TrainingError(f"jitter is {options.jitter}; expected a share from 0 to 1, in space 0")
+    if options.programs > MOST:
+        raise TrainingError(f"programs is {options.programs}; expected 1 to {MOST}")
     for name in ("pruned", "in_order", "sharing"):
         if (value := getattr(options, name)) not in (0, 1):
             raise TrainingError(f"{name} is {value}; expected 0 or 1")
@@ -95,15 +90,18 @@ def job(options: argparse.Namespace) -> Job:
             f"there are {len(programs)} programs to learn from, {len(others)} to test; expected some of both"
         )
     torch.manual_seed(options.seed)
+    lessons = {name: getattr(options, name) for name in LESSONS}
     network, begun = begin(options, options.dimensions)
     if options.sharing:
         share(network)
-    lessons = {name: getattr(options, name) for name in LESSONS}
     about = lessons | {
-        "dimensions": options.dimensions, "data": digest(programs), "network": asdict(network.config),
+        "dimensions": options.dimensions, "data": digest(programs.tokens), "network": asdict(network.config),
         "start": begun, "sharing": options.sharing, "precision": options.precision,
     }  # fmt: skip
-    task = ParseTask(Teacher(network), programs, others, Lessons(**lessons), about)
+    try:
+        task = ParseTask(Teacher(network), programs, others, Lessons(**lessons), about)
+    except ValueError as error:
+        raise TrainingError(str(error)) from error
     ready = partial(unshare, network) if options.sharing else Job.ready
     return Job(task, schedule, network, programs.describe(), ready=ready)
 
@@ -133,9 +131,9 @@ def spread(total: int, count: int) -> Int[Tensor, " some"]:
     return torch.arange(count) * total // max(1, count)
 
 
-def digest(programs: TokenSet) -> str:
-    """Names the programs and their order."""
-    return hashlib.sha256(programs.tokens.numpy().data).hexdigest()[:16]
+def digest(data: Tensor) -> str:
+    """Names what is learned from, programs or pictures, and its order."""
+    return hashlib.sha256(data.numpy().data).hexdigest()[:16]
 
 
 COMMAND = Command("CSGNet, which reads shapes and writes CSG programs", SETTINGS, add_options, job, folder)

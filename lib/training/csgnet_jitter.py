@@ -17,8 +17,13 @@ def jittered(
 ) -> Bool[Tensor, "n side side"]:
     """The images, about a share of them moved and stretched, each by random amounts in each direction.
 
-    What comes in from outside repeats the pixels of the edge. noise: a generator on the CPU.
+    What comes in from outside repeats the pixels of the edge. noise: a generator on the CPU. Raises ValueError for what
+    are no square images, and for a share that is not from 0 to 1.
     """
+    if images.ndim != 3 or images.shape[1] != images.shape[2]:
+        raise ValueError(f"found images {tuple(images.shape)}; expected (n, side, side)")
+    if not 0 <= share <= 1:
+        raise ValueError(f"found a share of {share}; expected 0 to 1")
     count, side = images.shape[:2]
     chosen = torch.rand(count, 1, generator=noise) < share
     rows, columns = (_places(chosen, side, noise).to(images.device) for _ in range(2))

@@ -55,7 +55,11 @@ class Actor(nn.Module):
         return written.tokens, written.log_probability
 
     def baseline(self, rewards: Float[Tensor, "n copies"], kind: str) -> Float[Tensor, "#n #copies"]:
-        """What to subtract from the rewards of a batch; afterwards they count among the past ones."""
+        """What to subtract from the rewards of a batch; afterwards they count among the past ones.
+
+        "running" has no past at the first batch, and takes that batch's mean. Raises ValueError as ReinforceTask does.
+        """
+        check_baseline(kind, rewards.shape[1])
         past = self.average.clone() if self.averaged else rewards.mean()
         share = AVERAGING if self.averaged else 0.0
         self.average.mul_(share).add_(rewards.mean(), alpha=1 - share)
@@ -65,6 +69,13 @@ class Actor(nn.Module):
         if kind == "none":
             return rewards.new_zeros(1, 1)
         return (rewards.sum(1, keepdim=True) - rewards) / (rewards.shape[1] - 1)
+
+
+def check_baseline(kind: str, copies: int) -> None:
+    """Raises ValueError for a baseline that is unknown, and for "image" with one program a picture."""
+    if kind not in BASELINES or copies < 1 + (kind == "image"):
+        found = f"the baseline {kind!r} with {copies} programs a picture"
+        raise ValueError(f"found {found}; expected one of {BASELINES}, and two or more for 'image'")
 
 
 @dataclass
@@ -89,9 +100,7 @@ class ReinforceTask:
     about: dict
 
     def __post_init__(self) -> None:
-        if self.baseline not in BASELINES or self.samples < 1 + (self.baseline == "image"):
-            found = f"the baseline {self.baseline!r} with {self.samples} programs a picture"
-            raise ValueError(f"found {found}; expected one of {BASELINES}, and two or more for 'image'")
+        check_baseline(self.baseline, self.samples)
         if not 0 < self.power < math.inf:
             raise ValueError(f"found the power {self.power} of the reward; expected a number above 0")
 

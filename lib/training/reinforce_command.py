@@ -1,7 +1,6 @@
 """python -m lib.training csgnet_reinforce [options]: a trained CSGNet goes on without a teacher; see `reinforce`."""
 
 import argparse
-import hashlib
 from pathlib import Path
 
 import torch
@@ -11,9 +10,10 @@ from torch import Tensor
 from ..datasets import DataError, silhouettes
 from ..datasets.csg import csg_programs
 from ..interpreters.csg import execute_many
+from ..models.csgnet import CSGNetConfig
 from ..models.pretrained import pretrained
 from .commands import Command, Job, Setting
-from .csgnet_command import SCRATCH, begin, evenly, spread
+from .csgnet_command import SCRATCH, begin, digest, evenly, spread
 from .loop import Schedule, TrainingError
 from .reinforce import BASELINES, Actor, ReinforceTask
 
@@ -68,8 +68,13 @@ def job(options: argparse.Namespace) -> Job:
     if options.start is None:
         options.start = str(pretrained("csgnet_2d"))
     network, begun = begin(options, dimensions=2)
+    if options.paper and network.config != CSGNetConfig.paper(2):
+        raise TrainingError(
+            f"{options.start}: found weights of other sizes than the paper's; expected, with --paper, --start with "
+            "those of `python -m lib.training csgnet --paper`"
+        )
     about = {
-        "data": _digest(images), "start": begun, "samples": options.samples, "baseline": options.baseline,
+        "data": digest(images), "start": begun, "samples": options.samples, "baseline": options.baseline,
         "power": options.power, "grammar": options.grammar, "precision": options.precision,
     }  # fmt: skip
     try:
@@ -89,10 +94,6 @@ def _pictures(source: str | None, split: str, most: int | None) -> tuple[Bool[Te
         return execute_many(programs.tokens).images, f"Pictures of {programs.describe()}"
     masks = silhouettes(source, split)
     return masks.images[spread(len(masks), most or len(masks))], masks.describe()
-
-
-def _digest(images: Tensor) -> str:
-    return hashlib.sha256(images.numpy().data).hexdigest()[:16]
 
 
 COMMAND = Command(

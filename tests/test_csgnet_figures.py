@@ -255,7 +255,29 @@ def test_a_file_that_holds_no_table_is_told(tmp_path, content):
             read(folder=tmp_path)
 
 
-def test_rows_without_their_quantity_are_told(tmp_path):
-    (tmp_path / "silhouettes.json").write_text('{"rows": {"nearest": {"iou": 3}}}')
-    with pytest.raises(ValueError, match="silhouettes.json: found no chamfer_px of nearest"):
+@pytest.mark.parametrize(
+    "content, told",
+    [
+        ('{"samples": 3, "rows": {"nearest": {"iou": 3}}}', "found no chamfer_px of nearest"),
+        ('{"samples": 3, "rows": {"nearest": {"chamfer_px": {"0": 3}}}}', "found no chamfer_px of nearest"),
+        (
+            '{"samples": 3, "rows": {"nearest": {"chamfer_px": "3", "iou": 3}}}',
+            "found no chamfer_px of nearest",
+        ),
+        ('{"rows": {"nearest": {"chamfer_px": 3}}}', "found no samples"),
+    ],
+)
+def test_rows_without_what_is_shown_are_told(tmp_path, content, told):
+    (tmp_path / "silhouettes.json").write_text(content)
+    with pytest.raises(ValueError, match=f"silhouettes.json: {told}"):
         table_3(tmp_path)
+
+
+@pytest.mark.parametrize("log", [[], [{"epoch": 1, "val_loss": 3.0}], [3], {"epoch": 1}])
+def test_curves_without_what_is_shown_are_told(tmp_path, log):
+    runs = [{"name": "mine", "log": log}]
+    (tmp_path / "teaching_curves.json").write_text(json.dumps({"runs": runs}))
+    with pytest.raises(
+        ValueError, match="teaching_curves.json: found no epochs with val_cd, val_loss in mine"
+    ):
+        long_runs(TAUGHT, tmp_path)

@@ -117,7 +117,7 @@ def test_a_film_has_a_frame_for_each_moment():
 
 def test_saved_results_are_shown_or_missed(tmp_path):
     assert long_runs(folder=tmp_path) is None and "measure_csgnet silhouettes" in table_3(tmp_path)
-    runs = [{"name": "from scratch", "log": []}]
+    runs = [{"name": "from scratch", "log": [{"epoch": 1, "val_reward": 0.5, "val_cd": 2.0}]}]
     (tmp_path / "reinforce_curves.json").write_text(json.dumps({"runs": runs}))
     assert long_runs(folder=tmp_path) == runs and long_runs(TAUGHT, tmp_path) is None
     ours = {n: 2.5 for n in ("0", "1", "2", "4", "10", "None")}

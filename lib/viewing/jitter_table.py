@@ -34,7 +34,7 @@ def jitter_table(folder: Path = RESULTS) -> str:
 
 
 def _rows(path: Path, names: tuple[str, ...]) -> dict[str, dict]:
-    rows = read_rows(path, {"chamfer_px"})["rows"]
+    rows = read_rows(path, {"chamfer_px": set()}, frozenset())["rows"]
     if set(names) - rows.keys():
         raise ValueError(
             f"{path}: found no rows {', '.join(names)}; measure them with data_scripts.measure_csgnet"

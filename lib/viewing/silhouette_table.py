@@ -28,7 +28,9 @@ def table_3(folder: Path = RESULTS) -> str:
     path = folder / TABLE
     if not path.is_file():
         return NO_TABLE
-    found, second = (read_rows(each, {"chamfer_px"}) for each in (path, folder / SECOND / TABLE))
+    found, second = (
+        read_rows(each, {"chamfer_px": SWEEPS.keys()}) for each in (path, folder / SECOND / TABLE)
+    )
     lines = [f"{found['samples']} silhouettes ({found['data']})", " " * 24 + _cells(SWEEPS.values())]
     for name, printed in PAPER.items():
         if name in found["rows"]:

@@ -182,9 +182,9 @@ def test_a_gallery_shows_targets_answers_and_breaks_programs():
     first, second = texts_of(ax)
     assert second == "0.0 px" and first.replace("\n  ", "") == long and "\n" in first
     comparison = ax.images[2].get_array()
-    assert tuple(comparison[0, 0]) == (1, 1, 1, 1)
+    assert tuple(comparison[0, 0]) == (1, 1, 1)
     assert not any(
-        to_hex(c) == COLOR_A for c in comparison.reshape(-1, 4)
+        to_hex(c) == COLOR_A for c in comparison.reshape(-1, 3)
     )  # the answer covers all of the target
     with pytest.raises(ValueError, match="found 1 targets, 1 answers and 2 titles"):
         gallery_figure(PICTURE[None], other[None], ["a", "b"])

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
+from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
@@ -82,6 +82,15 @@ def stamp(
         ax.vlines(x + lines[lines < width], y, y + height, **style)
         ax.hlines(y + lines[lines < height], x, x + width, **style)
     frame(ax, x, y, width, height, rim, wide)
+
+
+def overlay(ax: Axes, a: np.ndarray, b: np.ndarray, x: float, y: float) -> None:
+    """Two pictures of one size on each other, as `stamp` places one: blue only in a, orange only in b, grey in both."""
+    colors = np.full((*a.shape, 3), to_rgb(PAPER))
+    for part, color in ((a & b, BOTH), (a & ~b, COLOR_A), (b & ~a, COLOR_B)):
+        colors[part] = to_rgb(color)
+    _paste(ax, colors, x, y)
+    frame(ax, x, y, a.shape[1], a.shape[0])
 
 
 def _paste(ax: Axes, colors: np.ndarray, x: float, y: float) -> None:

@@ -8,10 +8,7 @@ lengths_figure(lengths, {"k = 10": row, …})    how likeness falls with the len
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
-import numpy as np
 from jaxtyping import Bool
-from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
@@ -19,7 +16,7 @@ from torch import Tensor
 
 from lib.interpreters.csg.packing import SIDE
 from lib.interpreters.csg.primitives import KINDS
-from lib.viewing.canvas import BOTH, COLOR_A, COLOR_B, COLORS, GAP, frame, page, stamp, write
+from lib.viewing.canvas import COLOR_A, COLOR_B, COLORS, GAP, overlay, page, stamp, write
 from lib.viewing.csgnet_figures import CURVES
 
 WIDTH = 860  # dots of a figure
@@ -51,17 +48,9 @@ def gallery_figure(
         y = place // columns * (SIDE + 2 * GAP + below) + GAP
         stamp(ax, target, x, y, COLOR_A)
         stamp(ax, answer, x + SIDE + 3, y, COLOR_B)
-        _compare(ax, target, answer, x + 2 * (SIDE + 3), y)
+        overlay(ax, target, answer, x + 2 * (SIDE + 3), y)
         write(ax, title, x, y + SIDE + 5 / scale, 7.4, True, ha="left")
     return figure
-
-
-def _compare(ax: Axes, target: np.ndarray, answer: np.ndarray, x: float, y: float) -> None:
-    colors = np.ones((SIDE, SIDE, 4))
-    for part, color in ((target & answer, BOTH), (target & ~answer, COLOR_A), (answer & ~target, COLOR_B)):
-        colors[part] = to_rgba(color)
-    ax.imshow(colors, extent=(x, x + SIDE, y + SIDE, y), aspect="auto", interpolation="auto", zorder=1)
-    frame(ax, x, y, SIDE, SIDE)
 
 
 def _broken(title: str, width: int) -> str:

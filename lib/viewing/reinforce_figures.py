@@ -18,14 +18,13 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 from torch import Tensor
 
 from lib.metrics.images import reward
-from lib.viewing.canvas import BOTH, COLOR_A, COLOR_B, DPI, GAP, PAPER, SOFT, dots_of, frame, page, write
+from lib.viewing.canvas import BOTH, COLOR_A, COLOR_B, DPI, GAP, SOFT, overlay, page, write
 
 COLORS = ("#9aa5b8", "#e28f4f", "#5e8bba", "#70ad77", "#9379b8")
 EXACT = "#d62839"
@@ -160,7 +159,7 @@ def answers_figure(
         write(ax, name.replace(" ", "\n"), 1, y + 32, 8.5, ha="left", va="center")
         for column, (target, image) in enumerate(zip(targets, images)):
             x = NAMES + column * cell + GAP // 2
-            _overlay(ax, target.numpy(), image.numpy(), x, y)
+            overlay(ax, target.numpy(), image.numpy(), x, y)
             if numbers:
                 write(ax, f"{numbers[name][column]:.1f}", x + 32, y + 65, 8.5, color=SOFT)
     below = len(answers) * (cell + low)
@@ -203,24 +202,11 @@ def _still(targets: Tensor, images: Tensor, caption: str, scale: float) -> Image
     """One frame, in few colours, so that it is small."""
     figure, ax = page(len(targets) * (64 + GAP), 64 + GAP + 14, scale)
     for column, (target, image) in enumerate(zip(targets, images)):
-        _overlay(ax, target.numpy(), image.numpy(), column * (64 + GAP) + GAP // 2, GAP // 2)
+        overlay(ax, target.numpy(), image.numpy(), column * (64 + GAP) + GAP // 2, GAP // 2)
     write(ax, caption, 4, 64 + GAP, 9, ha="left")
     out = io.BytesIO()
     figure.savefig(out, dpi=DPI)
     return Image.open(out).convert("RGB").quantize(32, dither=Image.Dither.NONE)
-
-
-def _overlay(ax: Axes, target: np.ndarray, image: np.ndarray, x: float, y: float) -> None:
-    """An answer over its target, the upper left corner at (x, y)."""
-    parts = ((target & image, BOTH), (target & ~image, COLOR_A), (image & ~target, COLOR_B))
-    colors = np.full((*target.shape, 3), to_rgb(PAPER))
-    for part, color in parts:
-        colors[part] = to_rgb(color)
-    height, width = target.shape
-    # Whole dots a pixel stay sharp; else some pixels would be wider than others.
-    smooth = "nearest" if dots_of(ax) == round(dots_of(ax)) else "antialiased"
-    ax.imshow(colors, extent=(x, x + width, y + height, y), interpolation=smooth, aspect="auto", zorder=1)
-    frame(ax, x, y, width, height)
 
 
 def _panels(count: int, width: float, height: float, **options) -> tuple[Figure, Sequence[Axes]]:

@@ -66,9 +66,14 @@ def test_all_choices_are_options_that_the_training_takes():
     from lib.training import stump_net_command
     from lib.training.commands import _parser
 
-    parser = _parser({"stump_net": stump_net_command.COMMAND})
-    parsed = [vars(parser.parse_args(["stump_net", *o.split()])) for o in ablate_stump_net.CHOICES.values()]
-    assert all(one != other for k, one in enumerate(parsed) for other in parsed[:k])
+    parser, made = _parser({"stump_net": stump_net_command.COMMAND}), []
+    for options in ablate_stump_net.CHOICES.values():
+        parsed = parser.parse_args(["stump_net", *options.split()])
+        for setting in stump_net_command.SETTINGS:
+            if getattr(parsed, setting.name) is None:
+                setattr(parsed, setting.name, setting.ours)
+        made.append((stump_net_command._config(parsed), stump_net_command._lesson(parsed)))
+    assert len(set(made)) == len(made)
 
 
 def test_a_training_that_cannot_end_leaves_no_table(tmp_path, monkeypatch, capsys):

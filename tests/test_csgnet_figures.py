@@ -87,9 +87,9 @@ def test_a_search_keeps_k_and_merges_twins_only(unchecked_shapes):
 
 
 def test_a_search_of_nothing_or_in_space_is_refused():
-    with pytest.raises(ValueError, match="found k = 0, 2 dimensions"):
+    with pytest.raises(ValueError, match="found k = 0, 13 tokens, 2 dimensions"):
         beam_steps(random_network(0), PICTURE, 0)
-    with pytest.raises(ValueError, match="3 dimensions; expected one or more, and the plane"):
+    with pytest.raises(ValueError, match="3 dimensions; expected one or more of both, and the plane"):
         beam_steps(random_network(0, dimensions=3), PICTURE)
 
 

@@ -87,7 +87,8 @@ class ReinforceTask:
     power     of the reward, the paper's gamma
     grammar   draw only programs that can be executed; the paper does not
     about     JSON: data and settings that must be the same when a run goes on
-    Raises ValueError for a baseline that is unknown, "image" with one program a picture, and a power of 0 or less.
+    Raises ValueError for a baseline that is unknown, "image" with one program a picture, a power of 0 or less, and no
+    pictures.
     """
 
     module: Actor
@@ -101,6 +102,9 @@ class ReinforceTask:
 
     def __post_init__(self) -> None:
         check_baseline(self.baseline, self.samples)
+        if not len(self.images) or not len(self.others):
+            found = f"{len(self.images)} pictures to learn from, {len(self.others)} to test"
+            raise ValueError(f"found {found}; expected some of both")
         if not 0 < self.power < math.inf:
             raise ValueError(f"found the power {self.power} of the reward; expected a number above 0")
 

@@ -51,14 +51,13 @@ def beam_steps(
 ) -> list[list[Beginning]]:
     """The candidates of each step, the likeliest first: SPARE * k of them, as many as the search looks at.
 
-    Raises ValueError for a network of space, and less than one program.
+    Raises ValueError for a network of space, and less than one program or token.
     """
-    if k < 1 or network.config.dimensions != 2:
-        raise ValueError(
-            f"found k = {k}, {network.config.dimensions} dimensions; expected one or more, and the plane"
-        )
-    kept, steps = [Beginning((), 0.0, 0.0, 0)], []
     longest = LONGEST[2] if longest is None else longest
+    if k < 1 or longest < 1 or network.config.dimensions != 2:
+        found = f"k = {k}, {longest} tokens, {network.config.dimensions} dimensions"
+        raise ValueError(f"found {found}; expected one or more of both, and the plane")
+    kept, steps = [Beginning((), 0.0, 0.0, 0)], []
     for room in range(longest, -1, -1):
         candidates = [
             each for place, one in enumerate(kept) for each in _continued(network, image, one, place, room)

@@ -173,14 +173,13 @@ class CSGNet(nn.Module):
     ) -> tuple[Float[Tensor, "rows steps tokens"], State]:
         """Scores (logits) of what comes after each of some tokens, and the state after the last.
 
-        before  tokens 0 to START, at least one a row. Raises ValueError for others.
+        before  tokens 0 to START, at least one a row; their range is not checked, which would slow down small networks.
+        Raises ValueError for other shapes.
         """
         steps = before.shape[1:]
         if len(before) != len(state.feature) or len(steps) != 1 or not steps[0]:
             found = f"tokens {tuple(before.shape)} for {len(state.feature)} shapes"
             raise ValueError(f"found {found}; expected as many rows, and one token or more in each")
-        if len(before) and not 0 <= before.min() <= before.max() <= self.start:
-            raise ValueError(f"found tokens {before.min()} to {before.max()}; expected 0 to {self.start}")
         weight = self.gru.weight_ih[:, self.config.feature :]
         # A token's share of the gates: computed for each token of the vocabulary, or for each that is given, whichever
         # are fewer.
@@ -208,8 +207,10 @@ class CSGNet(nn.Module):
     ) -> Float[Tensor, "rows steps tokens"]:
         """Scores of every token of known programs, each given those before it (teacher forcing).
 
-        Raises ValueError as `begin` and `advance` do.
+        Raises ValueError as `begin` and `advance` do, and for what are no tokens.
         """
+        if tokens.numel() and not 0 <= tokens.min() <= tokens.max() <= self.stop:
+            raise ValueError(f"found tokens {tokens.min()} to {tokens.max()}; expected 0 to {self.stop}")
         before = torch.cat([torch.full_like(tokens[:, :1], self.start), tokens[:, :-1]], 1)
         return self.advance(self.begin(canvases), before)[0]
 

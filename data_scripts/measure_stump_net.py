@@ -10,9 +10,8 @@ Writes results/stump_net/reconstruction.json, one row for each network:
     f_score       percent, for points as near as points of the cloud are to one another
     primitives, nodes    that a decided answer uses, means; "needed": those for 99 % of the test points in it
     seconds              from the cloud to its surface, one thread
-
     empty                share of the answers without a surface; these count as a single point in the middle
-    median_chamfer_mean  and by_category: means over the clouds of a category
+    median_chamfer_mean  the median over the clouds, where all else are means; by_category: over those of each category
 
 Networks see as many points of a cloud as in their training; the search sees all 2,048, and their normals.
 
@@ -80,7 +79,7 @@ def of_network(network: nn.Module, clouds: SolidSet, number: int) -> Answer:
 
 
 def counts(prefix: str, said: SoftStump) -> dict[str, float]:
-    """Primitives and nodes that the first decided answer uses."""
+    """Primitives and nodes that the decided answer to one cloud uses."""
     primitives, nodes = said.used()
     return {f"{prefix}primitives": float(primitives.sum()), f"{prefix}nodes": float(nodes.sum())}
 

@@ -13,7 +13,7 @@ import torch
 
 from lib.models.dgcnn import nearest
 from lib.models.stump_net import HEADS, StumpNet, StumpNetConfig
-from lib.training.stump_net import Lesson, StumpStudent
+from lib.training.stump_net import StumpLesson, StumpStudent
 from tests.bench_stump_layers import RESET, kilobytes
 from tests.timing import timed
 
@@ -25,7 +25,7 @@ MEANS = {"power": {"power": 8.0}, "softmax": {"power": None, "temperature": 20.0
 def stepper(head: str, mean: str) -> Callable[[], float]:
     """What makes one step, and returns the loss."""
     torch.manual_seed(0)
-    lesson = Lesson(2048, **MEANS[mean])
+    lesson = StumpLesson(2048, **MEANS[mean])
     student = StumpStudent(StumpNet(StumpNetConfig(head=head)), lesson).train()
     descent = torch.optim.Adam(student.parameters(), 1e-4)
     clouds, queries = torch.rand(2, 1, 2048, 3) - 0.5

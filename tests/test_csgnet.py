@@ -241,6 +241,9 @@ def test_a_network_of_the_plane_refuses_grids_and_the_other_way_round(dimensions
         ({"strides": (0, 1, 1)}, "at least 1"),
         ({"tokens": 4}, "5 tokens"),  # three operations and `$`: nothing to draw
         ({"hidden": 0}, "at least 1"),
+        ({"hidden": 12.5}, "whole sizes"),
+        ({"pools": (2, 2.0, 2)}, "whole sizes"),
+        ({"channels": (), "kernels": (), "strides": (), "pools": ()}, "at least 1"),
         ({"head": 0}, "at least 1"),
         ({"embedding": -1}, "at least 1"),
         ({**ONE, "kernels": (2,), "strides": (4,)}, "as wide as strides"),
@@ -252,6 +255,7 @@ def test_a_network_of_the_plane_refuses_grids_and_the_other_way_round(dimensions
         ({"dropout": -0.1}, "dropout of -0.1"),
     ],
 )
+@pytest.mark.usefixtures("unchecked_shapes")
 def test_sizes_that_make_no_network_are_refused(wrong, message):
     with pytest.raises(ValueError, match=message):
         CSGNetConfig(**wrong)

@@ -169,8 +169,12 @@ def test_saved_and_loaded(network, tmp_path):
         ({"head": "own", "nodes": 8}, "with the head 'own' as many nodes"),
         ({"nodes": 0}, "sizes of at least 1"),
         ({"widths": (0,)}, "sizes of at least 1"),
+        ({"widths": ()}, "one width or more"),
+        ({"rank": 1.5}, "whole sizes"),
+        ({"neighbours": 0}, "whole sizes"),
     ],
 )
+@pytest.mark.usefixtures("unchecked_shapes")
 def test_configs_that_make_no_sense_are_refused(given, told):
     with pytest.raises(ValueError, match=told):
         StumpNetConfig(**given)

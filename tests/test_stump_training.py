@@ -19,12 +19,12 @@ from lib.training import commands
 from lib.training.__main__ import COMMANDS
 from lib.training.loop import CHECKPOINT, LOG, Schedule, fit
 from lib.training.solids import SolidTask, iou
-from lib.training.stump_net import Lesson, StumpStudent, pulled, use
+from lib.training.stump_net import StumpLesson, StumpStudent, pulled, use
 from lib.training.ucsg import UCSGLesson, UCSGStudent
 from tests.conftest import unchecked
 
 TINY = StumpNetConfig(8, 4, rank=3, feature=8, widths=(8, 8), neighbours=3, points=20)
-LESSON = Lesson(queries=40)
+LESSON = StumpLesson(queries=40)
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +47,7 @@ def balls(count: int, seed: int = 0):
     return gathered(rows, "balls")
 
 
-def task_of(seed: int = 0, lesson: Lesson = LESSON, config: StumpNetConfig = TINY) -> SolidTask:
+def task_of(seed: int = 0, lesson: StumpLesson = LESSON, config: StumpNetConfig = TINY) -> SolidTask:
     torch.manual_seed(seed)
     return SolidTask(StumpStudent(StumpNet(config), lesson), balls(6), balls(3, seed=1), {})
 
@@ -66,7 +66,7 @@ def test_the_second_term_by_hand():
 
 
 def test_the_loss_is_both_terms():
-    task = task_of(lesson=Lesson(queries=40, weight=0.5, dullest=150))
+    task = task_of(lesson=StumpLesson(queries=40, weight=0.5, dullest=150))
     loss, terms = task.loss(task.network, [2, 0], torch.Generator().manual_seed(0), 0.0)
     clouds = task.train.points[[2, 0]].float()
     said = task.student.network(clouds)
@@ -80,7 +80,7 @@ def test_the_loss_is_both_terms():
 
 
 def test_few_points_are_the_noises_choice():
-    task = task_of(lesson=Lesson(queries=16), config=replace(TINY, points=12))
+    task = task_of(lesson=StumpLesson(queries=16), config=replace(TINY, points=12))
     losses = [
         task.loss(task.network, [0, 1], torch.Generator().manual_seed(seed), 0.0)[0].item()
         for seed in (0, 0, 1)
@@ -89,20 +89,20 @@ def test_few_points_are_the_noises_choice():
 
 
 def test_steeper_connections_are_so_in_the_second_half():
-    lesson = Lesson(connections="steeper")
+    lesson = StumpLesson(connections="steeper")
     assert [lesson.steepness(p) for p in (0, 0.5, 0.75, 1)] == [1, 1, 4.5, 8]
-    assert {Lesson(connections=other).steepness(1.0) for other in ("soft", "straight_through")} == {1}
+    assert {StumpLesson(connections=other).steepness(1.0) for other in ("soft", "straight_through")} == {1}
 
 
 @pytest.mark.parametrize("name", ["pull", "connections"])
 def test_other_names_are_refused(name):
     with pytest.raises(ValueError, match=f"found .*{name} 'both'; expected one of"):
-        Lesson(**{name: "both"})
+        StumpLesson(**{name: "both"})
 
 
 def test_power_and_temperature_exclude_each_other():
     with pytest.raises(ValueError, match="found a power of 8 and a temperature of 20; expected one of them"):
-        Lesson(temperature=20.0)
+        StumpLesson(temperature=20.0)
 
 
 def test_straight_through_connections_are_decided_and_have_a_slope():
@@ -123,7 +123,7 @@ def test_straight_through_is_for_learning_only():
     data, losses, soft = balls(3), {}, {}
     asked = data.points.float(), data.queries.float(), data.inside.float()
     for name in ("soft", "straight_through"):
-        student = task_of(lesson=Lesson(queries=40, weight=0, connections=name)).student.eval()
+        student = task_of(lesson=StumpLesson(queries=40, weight=0, connections=name)).student.eval()
         losses[name] = student(*asked, 1.0, torch.Generator())[0].item()
         said = student.network(asked[0])
         soft[name] = student.soft(said, said.distances(asked[1]))
@@ -134,7 +134,7 @@ def test_straight_through_is_for_learning_only():
 
 
 def test_surfaces_get_sharper_in_the_first_half():
-    lesson = Lesson(dullest=1.5)
+    lesson = StumpLesson(dullest=1.5)
     assert [lesson.sharpness(p) for p in (0, 0.25, 0.5, 1)] == pytest.approx([1.5, 15, 150, 150])
 
 

@@ -18,6 +18,11 @@ def whole(number) -> int | None:
         return None
 
 
+def sizes(*numbers) -> bool:
+    """Whether all are whole numbers, at least 1: what layers, lists and grids can be made of."""
+    return all((whole(number) or 0) >= 1 for number in numbers)
+
+
 def check_points(points, axes: str) -> Tensor:
     """(n, axes) numbers. Raises ValueError for everything else."""
     expected = f"(n, {len(axes)}) numbers: {', '.join(axes)}"

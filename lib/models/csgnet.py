@@ -11,11 +11,13 @@ others.
 """
 
 from dataclasses import dataclass
+from itertools import chain
 
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
+from ..interpreters.checks import sizes
 from ..interpreters.csg import vocabulary_of
 from ..interpreters.csg.packing import SIDE
 
@@ -34,7 +36,8 @@ class CSGNetConfig:
     embedding, hidden   widths of what stands for a token, and of the GRU
     dropout     share of the values that are dropped in training: after convolutions, GRU and linear layer
     head        width of the layer between GRU and scores; None: that of the GRU (paper)
-    Raises ValueError for lists of different lengths, sizes below 1, and canvases that do not divide.
+    Raises ValueError for lists of different lengths, sizes that are no whole numbers from 1, and canvases that
+    do not divide.
     """
 
     dimensions: int = 2
@@ -54,8 +57,8 @@ class CSGNetConfig:
         if self.dimensions not in (2, 3) or len({*map(len, lists)}) != 1:
             raise ValueError(f"found {self}; expected 2 or 3 dimensions, and lists of one length")
         widths = (self.embedding, self.hidden, self.hidden if self.head is None else self.head)
-        if min(self.tokens - 4, *widths, *(min(each, default=0) for each in lists)) < 1:
-            raise ValueError(f"found {self}; expected sizes of at least 1, and 5 tokens")
+        if not sizes(self.tokens, *widths, *chain(*lists)) or self.tokens < 5 or not self.channels:
+            raise ValueError(f"found {self}; expected whole sizes of at least 1, and 5 tokens")
         if any(kernel < stride or (kernel - stride) % 2 and stride > 1 for kernel, stride in self.windows):
             raise ValueError(f"found {self}; expected kernels as wide as strides, or wider by an even number")
         if self.norm not in NORMS:

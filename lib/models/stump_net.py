@@ -25,6 +25,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from ..interpreters.checks import sizes
 from ..interpreters.stump import KINDS, Primitive
 from .dgcnn import DGCNN
 from .soft_stump import SoftStump
@@ -72,9 +73,9 @@ class StumpNetConfig:
             raise ValueError(f"found the head {self.head!r}; expected one of {', '.join(HEADS)}")
         if not self.kinds or not set(self.kinds) <= MADE_OF.keys():
             raise ValueError(f"found the kinds {self.kinds}; expected some of {', '.join(MADE_OF)}")
-        sizes = (self.primitives, self.nodes, self.rank, self.feature, self.points)
-        if min(*sizes, *self.widths) < 1 or not self.widths:
-            raise ValueError(f"found {self}; expected sizes of at least 1, and one width or more")
+        numbers = (self.primitives, self.nodes, self.rank, self.feature, self.points, self.neighbours)
+        if not sizes(*numbers, *self.widths) or not self.widths:
+            raise ValueError(f"found {self}; expected whole sizes of at least 1, and one width or more")
         if self.primitives % len(self.kinds) or self.head == "own" and self.nodes != self.primitives:
             found = f"{self.primitives} primitives of {len(self.kinds)} kinds, {self.nodes} nodes, head {self.head!r}"
             raise ValueError(

@@ -20,6 +20,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
+from ..interpreters.checks import sizes
 from ..interpreters.stump import Box, Primitive, Sphere
 from .dgcnn import DGCNN
 from .stump_net import PrimitiveHead, decoder
@@ -32,7 +33,7 @@ STATE = 256  # numbers of the GRU's state
 class UCSGConfig:
     """each: primitives of a kind; layers; nodes: of all layers but the last; the rest: see StumpNetConfig.
 
-    Raises ValueError for sizes below 1.
+    Raises ValueError for sizes that are no whole numbers from 1.
     """
 
     each: int = 32
@@ -44,9 +45,9 @@ class UCSGConfig:
     points: int = 256
 
     def __post_init__(self) -> None:
-        sizes = (self.each, self.layers, self.nodes, self.feature, self.points)
-        if min(*sizes, *self.widths) < 1 or not self.widths:
-            raise ValueError(f"found {self}; expected sizes of at least 1, and one width or more")
+        numbers = (self.each, self.layers, self.nodes, self.feature, self.points, self.neighbours)
+        if not sizes(*numbers, *self.widths) or not self.widths:
+            raise ValueError(f"found {self}; expected whole sizes of at least 1, and one width or more")
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ LENGTHS = {"half", "radius"}  # of what a primitive is told by
 
 
 @dataclass(frozen=True)
-class Lesson:
+class StumpLesson:
     """How it is taught.
 
     queries     of each cloud that are asked about in a step, half of them inside
@@ -90,7 +90,7 @@ class Lesson:
 class StumpStudent(Student):
     """CSG-Stump Net and its lesson."""
 
-    def __init__(self, network: StumpNet, lesson: Lesson):
+    def __init__(self, network: StumpNet, lesson: StumpLesson):
         super().__init__()
         self.network, self.lesson = network, lesson
 

@@ -9,7 +9,7 @@ from ..models.stump_net import HEADS, MADE_OF, StumpNet, StumpNetConfig
 from . import solids_command
 from .commands import Command, Job, Setting
 from .loop import TrainingError
-from .stump_net import CONNECTIONS, PULLS, Lesson, StumpStudent
+from .stump_net import CONNECTIONS, PULLS, StumpLesson, StumpStudent
 
 SETTINGS = (
     *solids_command.LOOP,
@@ -68,10 +68,10 @@ def _config(options: argparse.Namespace) -> StumpNetConfig:
     return base(*sizes, **given)
 
 
-def _lesson(options: argparse.Namespace) -> Lesson:
+def _lesson(options: argparse.Namespace) -> StumpLesson:
     means = {"power": options.power} if options.power else {"power": None, "temperature": options.temperature}
     names = ("queries", "pull", "weight", "connections", "dullest")
-    return Lesson(**{name: getattr(options, name) for name in names}, **means)
+    return StumpLesson(**{name: getattr(options, name) for name in names}, **means)
 
 
 COMMAND = Command(

@@ -23,7 +23,25 @@ RIGHT = [
     (check_pull, [-0.2, 0.0, 0.3]),
     (check_use, lambda w_i, w_u: ((w_i & w_u).any(1).sum(), w_u.sum())),
     (check_cover, cover),
+    (check_low_rank, lambda p, n, g: p.mul_(g) @ n.T),  # changes what it is given
+    (check_low_rank, lambda p, n, g: ((p * g) @ n.T).half()),
+    (check_low_rank, lambda p, n, g: ((p * g) @ n.T).to_sparse()),
+    (check_use, lambda w_i, w_u: [w_i[:, w_u].any(1).float().sum(), w_u.float().sum()]),
 ]
+
+
+class Silent(Exception):
+    def __str__(self):
+        raise RuntimeError("no words")
+
+
+def fails(error):
+    def answer(*given):
+        raise error
+
+    return answer
+
+
 WRONG = [
     (check_reach, (0.364, 0.0242), "sharpness 150, the slope is 0.000"),
     (check_reach, (0.0242,), "two distances"),
@@ -38,6 +56,15 @@ WRONG = [
     (check_cover, lambda inside: torch.ones(len(inside), dtype=torch.bool), "would do"),
     (check_cover, lambda inside: torch.zeros(len(inside), dtype=torch.bool), "hold 0.0%"),
     (check_cover, lambda inside: inside, "bool tensor"),
+    (check_cover, lambda inside: cover(inside).byte(), "found uint8 (5,)"),
+    (check_cover, lambda inside: cover(inside).to("meta"), "failed"),
+    (check_cover, fails(Silent()), "the function failed: Silent"),
+    (check_cover, fails(ValueError("two\nlines")), "the function failed: two lines"),
+    (check_low_rank, lambda p, n, g: (p.zero_(), torch.zeros(len(p), len(n)))[1], "the numbers are not"),
+    (check_low_rank, lambda p, n, g: (g.fill_(1), p @ n.T)[1], "the numbers are not"),
+    (check_use, lambda w_i, w_u: (w_i.zero_(), w_u.zero_(), (0, 0))[2], "gave 0, 0"),
+    (check_use, lambda w_i, w_u: (w_i[:, w_u].any(1).sum() + 0.4, w_u.sum()), "not united"),
+    (check_use, lambda w_i, w_u: "33", "two numbers"),
 ]
 
 

@@ -122,12 +122,22 @@ def test_the_folder_one_is_in(folder, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "given", [{"points": 0}, {"queries": 0}, {"queries": 7}, {"seed": -1}, {"points": 5.5}, {"queries": "8"}]
+    "given",
+    [
+        {"points": 0},
+        {"queries": 0},
+        {"queries": 7},
+        {"seed": -1},
+        {"points": 5.5},
+        {"queries": "8"},
+        {"points": 10**12},
+        {"queries": 10**9},
+    ],
 )
 def test_numbers_that_make_no_sense(folder, given):
     with (
         unchecked(),
-        pytest.raises(DataError, match="expected whole numbers, at least 1, an even one from 2, and 0"),
+        pytest.raises(DataError, match="expected whole numbers, from 1, an even one from 2, both to 1048576"),
     ):
         read_occnet(folder, "val", **given)
 

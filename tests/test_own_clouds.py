@@ -43,17 +43,33 @@ def test_a_text_with_a_heading_and_more_columns(tmp_path):
 
 @pytest.mark.parametrize(
     "start, apart, comma",
-    [("\ufeff", " ", "."), ("", "; ", ","), ("", " ", ","), ("", ", ", "."), ("", ",", ".")],
+    [
+        ("\ufeff", " ", "."),
+        ("", "; ", ","),
+        ("", " ", ","),
+        ("", ", ", "."),
+        ("", ",", "."),
+        ("", ", ", ","),
+    ],
 )
-def test_how_a_text_may_be_written(tmp_path, start, apart, comma):
-    """A byte order mark, and decimal commas, as spreadsheets write them."""
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_how_a_text_may_be_written(tmp_path, start, apart, comma, encoding):
+    """Byte order marks, and decimal commas, as spreadsheets write them."""
     points = np.random.default_rng(0).integers(-9, 9, size=(60, 3)) / 4
     lines = [apart.join(f"{x:g}".replace(".", comma) for x in row) for row in points]
-    (tmp_path / "cloud.txt").write_text(start + "\n".join(lines), encoding="utf-8")
+    (tmp_path / "cloud.txt").write_text(start + "\n".join(lines), encoding=encoding)
     cloud = read_cloud(tmp_path / "cloud.txt", 100)
     assert "A cloud of 60 points." in cloud.told
     back = cloud.back(cloud.points.double()).numpy()
     assert np.abs(back[:, None] - points[None]).max(2).min(1).max() < 1e-5
+
+
+def test_a_byte_order_mark_hides_no_corner(tmp_path):
+    text = "v 0 0 0\nv 1 0 0\nv 0 5 0\nv 0 0 9\nf 1 2 3\n"
+    for name, encoding in (("with", "utf-8-sig"), ("without", "utf-8")):
+        (tmp_path / f"{name}.obj").write_text(text, encoding=encoding)
+    marked, plain = (read_cloud(tmp_path / f"{name}.obj", 50) for name in ("with", "without"))
+    assert torch.equal(marked.points, plain.points) and marked.points[:, 2].abs().max() == 0
 
 
 def test_few_points_of_a_mesh(box, tmp_path):
@@ -96,7 +112,9 @@ def test_the_seed_decides(box, tmp_path):
     [
         ("a.step", "x", "found a file .step; expected .obj, .ply"),
         ("a", "x", "found a file without an ending"),
-        ("a.obj", "", "found 0 points that differ; expected a shape"),
+        ("a.obj", "", "found neither triangles nor points; expected a whole file of the kind obj"),
+        ("a.stl", "x" * 400, "expected a whole file"),
+        ("a.off", "", "cannot be read as off .*; expected a whole file of that kind"),
         ("a.obj", "v 1 2\nv 2 3\nv 3 3\nf 1 2 3\n", "cannot be read as obj"),
         ("a.xyz", "", "found no line that begins with three numbers"),
         ("a.csv", '"1","2","3"\n' * 50, "found no line that begins with three numbers"),

@@ -118,6 +118,13 @@ def test_a_field_that_is_no_number_is_told():
         surface(lambda points: torch.where(points[:, 0] > 0, torch.nan, -1.0), CLOUD)
 
 
+def test_a_field_has_a_number_for_each_point():
+    with pytest.raises(
+        ValueError, match=r"found a field of shape \([0-9]+, 3\) at [0-9]+ points; expected a number each"
+    ):
+        surface(lambda points: points, CLOUD, COARSE)
+
+
 def test_a_cloud_without_thickness_has_an_empty_mesh():
     assert surface(lambda points: -torch.ones(len(points)), CLOUD * torch.tensor([1.0, 1, 0])).is_empty
 
@@ -250,6 +257,18 @@ def test_the_first_points_are_looked_at_and_all_say_where_the_box_ends():
 def test_clouds_that_networks_do_not_know_are_refused(cloud, told):
     with pytest.raises(ValueError, match=told):
         reconstructed(untrained(StumpNet, 0), cloud)
+
+
+def test_networks_that_cannot_answer_are_refused():
+    network, cloud = untrained(StumpNet, 0), clouds(1)[0]
+    before = [each.clone() for each in network.state_dict().values()]
+    with pytest.raises(ValueError, match="found a network in training mode; expected one after"):
+        reconstructed(network.train(), cloud)
+    assert all(map(torch.equal, network.state_dict().values(), before))
+    with torch.no_grad():
+        network.eval().to_union.bias.fill_(torch.nan)
+    with pytest.raises(ValueError, match="found connections that are no numbers"):
+        reconstructed(network, cloud)
 
 
 def test_a_network_that_unites_nothing_says_nothing():

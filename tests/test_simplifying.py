@@ -1,11 +1,14 @@
 """What is left of a decided answer: few nodes, nearly the same points."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
 from lib.interpreters.stump import Box, Sphere
 from lib.models.simplifying import cover, simplified
 from lib.models.soft_stump import SoftStump
+from tests.conftest import unchecked
 
 CROWD = torch.rand(1, 4000, 3, generator=torch.Generator().manual_seed(0)) - 0.5
 
@@ -51,3 +54,11 @@ def test_hidden_and_empty_nodes_go():
     assert (said.union > 0).all()
     with pytest.raises(ValueError, match="found points that are not finite"):
         simplified(said, CROWD * torch.nan)
+    with unchecked():
+        for points in (CROWD[0], CROWD[:, :0], CROWD[:0], CROWD.repeat(2, 1, 1), CROWD[..., :2]):
+            with pytest.raises(ValueError, match=r"expected \(1, m, 3\), a row for each answer"):
+                simplified(said, points)
+    spoilt = replace(said, intersection=torch.full_like(said.intersection, torch.nan))
+    for ask in (lambda: simplified(spoilt, CROWD), spoilt.stumps, lambda: spoilt.signed(distances)):
+        with pytest.raises(ValueError, match="found connections that are no numbers"):
+            ask()

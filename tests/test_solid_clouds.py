@@ -90,6 +90,11 @@ def test_joined_sets_have_equally_many_points(made):
         ({"points": np.zeros((6, 5, 3))}, "found points float64 .*; expected float16"),
         ({"queries": np.zeros((6, 5, 2), np.float16)}, "found queries float16"),
         ({"normals": np.full((6, 5, 3), np.nan, np.float16)}, "found normals that are not finite"),
+        (
+            {"points": np.full((6, 5, 3), 3e4, np.float16)},
+            "found points up to 30000 from the origin; expected shapes",
+        ),
+        ({"points": np.zeros((6, 5, 3), np.float16)}, "found points up to 0 from the origin"),
         ({"ids": np.arange(6)}, "found ids int64"),
         ({"ids": np.array("s0")}, r"found ids <U2 \(\)"),
         ({"normals": np.zeros((6, 4, 3), np.float16)}, "found 5 points, 4 normals and 8 queries"),

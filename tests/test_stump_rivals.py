@@ -166,6 +166,11 @@ def test_the_network(network, tmp_path):
     assert torch.equal(load(UCSG, tmp_path / "net")(clouds).choices[1], network.eval()(clouds).choices[1])
 
 
+def test_too_many_layers_are_refused():
+    with pytest.raises(ValueError, match="found 65 layers; expected at most 64"):
+        UCSGConfig(layers=65)
+
+
 @pytest.mark.parametrize("wrong", [{"layers": 0}, {"nodes": 1.5}, {"widths": ()}])
 @pytest.mark.usefixtures("unchecked_shapes")
 def test_sizes_that_make_no_sense_are_refused(wrong):

@@ -276,6 +276,11 @@ def test_the_papers_settings(tmp_path):
         (["--weight", "nan"], "TrainingError: found 32 queries, weight nan"),
         (["--weight", "inf"], "TrainingError: found 32 queries, weight inf"),
         (["--queries", "1"], "TrainingError: found 1 queries"),
+        (
+            ["--points", "1025"],
+            "TrainingError: found --points 1025, and clouds of 1024 points; expected at most",
+        ),
+        (["--queries", "2050"], "TrainingError: found --queries 2050, and clouds of 2048 queries"),
         (["--precision", "bf16-mixed"], "TrainingError: found the precision bf16-mixed; expected 32-true"),
         (["--power", "-1"], "TrainingError: found a power of -1"),
         (["--power", "0", "--temperature", "999"], "TrainingError: found a temperature of 999"),

@@ -254,6 +254,7 @@ def test_a_training_draws_no_random_numbers_of_others(tmp_path):
 
 # ---- gradient descent with momentum, in place of Adam ----
 
+HEADER = ("about", "log", "told")  # of a checkpoint
 DESCENT = Schedule(epochs=3, batch=4, rate=0.05, momentum=0.5, seed=5)
 
 
@@ -310,9 +311,10 @@ def test_a_checkpoint_of_the_other_optimizer_is_refused(tmp_path, was, now):
 def test_arrays_of_the_other_optimizer_are_named(tmp_path):
     """A file that says it is of gradient descent and holds what Adam keeps."""
     fit(Line(), Schedule(**vars(DESCENT) | {"momentum": 0.0}), tmp_path)
-    tensors, facts = read(tmp_path / CHECKPOINT, KIND)
-    about = facts["about"] | {"momentum": DESCENT.momentum}
-    write(tmp_path / CHECKPOINT, tensors, KIND, {"about": about, "log": facts["log"]})
+    fit(Line(), DESCENT, tmp_path / "descent")
+    tensors, _ = read(tmp_path / CHECKPOINT, KIND)
+    _, facts = read(tmp_path / "descent" / CHECKPOINT, KIND)
+    write(tmp_path / CHECKPOINT, tensors, KIND, {key: facts[key] for key in HEADER})
     task = Line()
     before = [tensor.clone() for tensor in bits(task)]
     with pytest.raises(CheckpointError, match="as 'adam.exp_avg.line.bias'; expected nothing"):
@@ -388,15 +390,14 @@ def test_arrays_that_do_not_fit_are_named(checkpoint, name, value, told):
         del tensors[name]
     else:
         tensors[name] = value if isinstance(value, torch.Tensor) else torch.full_like(tensors[name], value)
-    write(checkpoint, tensors, KIND, {key: facts[key] for key in ("about", "log")})
+    write(checkpoint, tensors, KIND, {key: facts[key] for key in HEADER})
     refused(checkpoint, told.format(name))
 
 
 def test_surplus_arrays_are_named(checkpoint):
     tensors, facts = read(checkpoint, KIND)
-    write(
-        checkpoint, tensors | {"surplus": torch.zeros(1)}, KIND, {key: facts[key] for key in ("about", "log")}
-    )
+    tensors["surplus"] = torch.zeros(1)
+    write(checkpoint, tensors, KIND, {key: facts[key] for key in HEADER})
     refused(checkpoint, "'surplus'; expected nothing")
 
 
@@ -411,6 +412,17 @@ def test_settings_without_sense_are_refused(checkpoint):
     tensors, facts = read(checkpoint, KIND)
     write(checkpoint, tensors, KIND, {"about": 3, "log": facts["log"]})
     refused(checkpoint, "found no settings")
+
+
+@pytest.mark.parametrize("old, new", [(b"seconds", b"secondz"), (b'loss\\": ', b'loss\\": 1')])
+def test_a_header_with_other_words_is_refused(checkpoint, old, new):
+    content = checkpoint.read_bytes()
+    changed = content.replace(old, new)
+    assert changed != content
+    if grown := len(changed) - len(content):  # the first 8 bytes say how long the header is
+        changed = (int.from_bytes(content[:8], "little") + grown).to_bytes(8, "little") + changed[8:]
+    checkpoint.write_bytes(changed)
+    refused(checkpoint, "is damaged: its settings and log are not those that were written")
 
 
 # ---- the command ----

@@ -114,8 +114,12 @@ def test_the_table_has_the_measured_rows(tmp_path):
     second = {name: row | {"chamfer_mean": 9.0} for name in ("zebra", "bounding_box", "unknown")}
     (tmp_path / "seed_1" / "r.json").write_text(json.dumps({"rows": second}))
     lines = rivals_table(path).splitlines()
-    assert len(lines) == 3 and lines[0].endswith("CD, seed 1")
-    assert lines[1].split()[-1] == "-" and lines[2].split()[-1] == "9.00"  # a box has no seed
+    assert len(lines) == 3 and lines[0].endswith("CD, seed 1 IoU, seed 1")
+    assert lines[1].split()[-2:] == ["-", "-"] and lines[2].split()[-2:] == [
+        "9.00",
+        "70.0",
+    ]  # a box has no seed
+    assert [ax.lines[0].get_xdata().tolist() for ax in rivals_figure(path).axes] == [[9.0], [70.0]]
 
 
 @pytest.mark.parametrize(
@@ -180,3 +184,8 @@ def test_what_is_no_solid_stump_is_refused():
         StumpSliders(parse("F1 = circle(radius=1)\nS1 = F1\nT = S1\n"), CORNERS)
     with pytest.raises(ValueError, match="expected 0 to 1"):
         StumpSliders(TWO, CORNERS).choose(2)
+    with unchecked():
+        with pytest.raises(ValueError, match="found points of shape .*; expected"):
+            StumpSliders(TWO, CORNERS[:, :2])
+        with pytest.raises(ValueError, match="found primitive 1.0; expected 0 to 1"):
+            StumpSliders(TWO, CORNERS.numpy()).choose(1.0)

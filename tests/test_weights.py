@@ -178,6 +178,15 @@ def test_weights_that_are_not_finite_are_refused(network, path, value):
         load(Tiny, path)
 
 
+def test_variances_below_0_are_refused(network, path):
+    network.norm.running_var[0] = -1
+    save(network, path)
+    with pytest.raises(
+        CheckpointError, match="variances below 0 in 'norm.running_var'; expected some from 0"
+    ):
+        load(Tiny, path)
+
+
 def test_half_of_the_digits_and_half_of_the_bytes(network, path, tmp_path):
     """float16 has 11 binary digits: a weight comes back with a relative error below 2^-11, as float32."""
     with torch.no_grad():

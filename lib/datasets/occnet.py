@@ -21,6 +21,7 @@ from .images import SPLITS
 from .solid_clouds import SolidSet, gathered
 from .solid_sampling import SolidSample
 
+MOST = 1 << 20  # points of a model that can be asked for
 FARTHEST = 1e4  # of numbers that are kept in half precision
 
 
@@ -34,10 +35,16 @@ def read_occnet(
     another split, no points or an odd number of queries, and for files that are missing, damaged or of another kind.
     """
     asked = [whole(number) for number in (points, queries, seed)]
-    if None in asked or asked[0] < 1 or asked[1] < 2 or asked[1] % 2 or asked[2] < 0:
+    if (
+        None in asked
+        or not 1 <= asked[0] <= MOST
+        or not 2 <= asked[1] <= MOST
+        or asked[1] % 2
+        or asked[2] < 0
+    ):
         raise DataError(
-            f"found {points!r} points, {queries!r} queries, seed {seed!r}; expected whole numbers, at least 1, an "
-            "even one from 2, and 0"
+            f"found {points!r} points, {queries!r} queries, seed {seed!r}; expected whole numbers, from 1, an even one "
+            f"from 2, both to {MOST}, and one from 0"
         )
     points, queries, seed = asked
     folder = Path(folder)

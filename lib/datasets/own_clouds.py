@@ -9,6 +9,8 @@ A mesh is sampled, uniform by area. Of a cloud without faces points are chosen. 
 twice, or that lie far from all others are left out.
 """
 
+import codecs
+import io
 import itertools
 import re
 from dataclasses import dataclass
@@ -110,17 +112,24 @@ def _points(path: Path, count: int, seed: int) -> tuple[np.ndarray, list[str]]:
     except DataError:
         raise
     except Exception as error:  # readers of meshes raise whatever they meet
-        raise DataError(f"{path}: cannot be read as {kind[1:]} ({error})") from error
+        told = f"{path}: cannot be read as {kind[1:]} ({error})"
+        raise DataError(f"{told}; expected a whole file of that kind") from error
 
 
 def _geometry(path: Path, count: int, seed: int) -> tuple[np.ndarray, list[str]]:
     """Points on all meshes of a file; where it has none, all its vertices."""
-    found = trimesh.load(path, process=False)
+    content = path.read_bytes().removeprefix(codecs.BOM_UTF8)  # which hides the first line of an OBJ file
+    found = trimesh.load(io.BytesIO(content), file_type=path.suffix[1:].lower(), process=False)
     parts = found.dump() if isinstance(found, trimesh.Scene) else [found]
     meshes = [part for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
     if not meshes:
         vertices = [np.asarray(part.vertices, dtype=float).reshape(-1, 3) for part in parts]
         points = np.concatenate([np.zeros((0, 3)), *vertices])
+        if not len(points):
+            kind = path.suffix[1:].lower()
+            raise DataError(
+                f"{path}: found neither triangles nor points; expected a whole file of the kind {kind}"
+            )
         return points, [f"A cloud of {len(points)} points."]
     mesh = trimesh.util.concatenate(meshes)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -141,10 +150,12 @@ def _is_closed(mesh: trimesh.Trimesh) -> bool:
 def _table(path: Path) -> tuple[np.ndarray, list[str]]:
     """A text with x, y and z first in each line, between spaces, commas or semicolons; all else is not looked at.
 
-    Between spaces or semicolons numbers may have decimal commas.
+    Between spaces, semicolons, or commas with a space behind, numbers may have decimal commas.
     """
     rows = []
-    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    content = path.read_bytes()
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    text = content.decode("utf-16" if wide else "utf-8", errors="replace").removeprefix("\ufeff")
     for number, line in enumerate(text.splitlines(), start=1):
         words = _cells(line.split("#")[0])
         try:
@@ -165,7 +176,7 @@ def _table(path: Path) -> tuple[np.ndarray, list[str]]:
 
 def _cells(line: str) -> list[str]:
     """What stands between semicolons, spaces or commas; empty texts where nothing stands between two marks."""
-    words = line.split()
+    words = [word.removesuffix(",") for word in line.split()]
     if ";" in line:
         parts = line.split(";")
     elif len(words) >= 3 and all(map(WITH_COMMA.fullmatch, words[:3])):

@@ -29,6 +29,7 @@ SOURCES = ("shapeassembly", "furniture", "sweethome3d", "csg")  # what data_scri
 ARRAYS = ("points", "normals", "queries")
 TEXTS = ("ids", "splits", "categories")
 EMBEDDED = 40  # pieces of each category with no download
+LARGEST = 1.0  # coordinate of a cloud of diagonal 1 around the origin, with room to spare
 SIZES = {"points": 1024, "queries": 2048}  # of each embedded solid: two seconds' work for all
 
 
@@ -127,6 +128,10 @@ def read(path: Path, source: str) -> SolidSet:
             )
         if not np.isfinite(array).all():
             raise DataError(f"{path}: found {name} that are not finite; expected numbers")
+    if (size := np.abs(arrays["points"]).max(initial=0)) > LARGEST or size == 0 < count:
+        raise DataError(
+            f"{path}: found points up to {size:g} from the origin; expected shapes of diagonal 1 around it"
+        )
     points, normals, queries = (arrays[name].shape[1] for name in ARRAYS)
     if not points or normals != points or queries < 2 or queries % 2:
         raise DataError(

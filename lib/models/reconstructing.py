@@ -33,10 +33,13 @@ def reconstructed(network: nn.Module, cloud: Float[Tensor, "n 3"], cell: float =
     """The solid that a network says of a cloud (diagonal 1, around the origin), decided; perhaps empty.
 
     All points say where the cloud's box ends; how many are looked at, the first ones, is the network's matter. Raises
-    ValueError for other clouds: `lib.datasets.read_cloud` moves and scales them.
+    ValueError for other clouds, which `lib.datasets.read_cloud` moves and scales, for a network that is being trained,
+    and for one that answers with what is no number.
     """
     cloud = check_points(cloud, "xyz").to(next(network.parameters()))
     _check_place(cloud)
+    if network.training:  # its answers, and its running means, would depend on what it is asked
+        raise ValueError("found a network in training mode; expected one after network.eval()")
     return surface(decided(network(cloud.unsqueeze(0))), cloud, cell)
 
 
@@ -62,8 +65,9 @@ def surface(field: Field, cloud: Float[Tensor, "n 3"], cell: float = CELL) -> tr
     """A closed surface where the field, negative inside, is 0, within the cloud's box; perhaps empty.
 
     Raises ValueError for a cloud without points, or whose box has no sensible number of cells, and where the field is
-    no number.
+    no number, or not one for each point.
     """
+    cloud = check_points(cloud, "xyz")
     if not len(cloud):
         raise ValueError("found a cloud without points; expected 1 or more")
     low, high = cloud.amin(0), cloud.amax(0)
@@ -75,6 +79,10 @@ def surface(field: Field, cloud: Float[Tensor, "n 3"], cell: float = CELL) -> tr
     axes = [start + cell * torch.arange(count).to(start) for start, count in zip(first, counts.tolist())]
     points = torch.cartesian_prod(*axes)
     values = torch.cat([field(part) for part in points.split(AT_ONCE)])
+    if values.shape != points.shape[:1]:
+        raise ValueError(
+            f"found a field of shape {tuple(values.shape)} at {len(points)} points; expected a number each"
+        )
     if values.isnan().any():
         raise ValueError("found a field that is no number somewhere; expected numbers, negative inside")
     beyond = torch.maximum(low - points, points - high).amax(1)  # of the box: negative inside

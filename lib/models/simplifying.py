@@ -36,13 +36,16 @@ def cover(inside: Bool[Tensor, "c m"], share: float = SHARE) -> Int[Tensor, " ke
 def simplified(said: SoftStump, points: Float[Tensor, "b m 3"], share: float = SHARE) -> SoftStump:
     """The same answers with only those nodes united that `cover` keeps, told by these points.
 
-    Raises ValueError for points that are not finite, and for a share that is not from 0 to 1.
+    Raises ValueError for points of another number of answers, none, or some that are not finite; see also `cover`.
     """
+    if points.ndim != 3 or points.shape[::2] != (len(said), 3) or not points.shape[1]:
+        raise ValueError(
+            f"found points {tuple(points.shape)}; expected ({len(said)}, m, 3), a row for each answer"
+        )
     if not points.isfinite().all():
         raise ValueError("found points that are not finite; expected numbers")
     union = torch.full_like(said.union, -torch.inf)
-    for row, distances in enumerate(said.distances(points)):
-        w_c, w_i, w_u = (logits[row] > 0 for logits in said.logits)
+    for row, (distances, w_c, w_i, w_u) in enumerate(zip(said.distances(points), *said.matrices)):
         held = (layers.signed_nodes(distances, w_c, w_i) <= 0) & w_u.unsqueeze(1)
         kept = cover(held, share)
         union[row, kept] = said.union[row, kept]

@@ -63,14 +63,22 @@ class SoftStump:
         return layers.binary(distances <= 0, *(logits > 0 for logits in self.logits))[1]
 
     def signed(self, distances: Float[Tensor, "b k m"]) -> Float[Tensor, "b m"]:
-        """Decided, too: negative inside, 0 on the surface; see `layers.signed`."""
-        matrices = [logits > 0 for logits in self.logits]
-        return torch.stack([layers.signed(*each) for each in zip(distances, *matrices)])
+        """Decided, too: negative inside, 0 on the surface; see `layers.signed` and `matrices`."""
+        return torch.stack([layers.signed(*each) for each in zip(distances, *self.matrices)])
 
     @property
     def logits(self) -> tuple[Tensor, Tensor, Tensor]:
         """Complement (b, K), intersection (b, K, C), union (b, C)."""
         return self.complement, self.intersection, self.union
+
+    @property
+    def matrices(self) -> tuple[Bool[Tensor, "b k"], Bool[Tensor, "b k c"], Bool[Tensor, "b c"]]:
+        """W_C, W_I and W_U, decided. Raises ValueError for logits that are no numbers: those of spoiled weights."""
+        if any(logits.isnan().any() for logits in self.logits):
+            raise ValueError(
+                "found connections that are no numbers; expected a network that answers with numbers"
+            )
+        return tuple(logits > 0 for logits in self.logits)
 
     def used(self) -> tuple[Bool[Tensor, "b k"], Bool[Tensor, "b c"]]:
         """Which primitives and which nodes each decided stump uses: nodes that are united, and what these select."""
@@ -80,11 +88,11 @@ class SoftStump:
     def stumps(self) -> Sequence[Stump]:
         """The decided stump of each cloud, on the CPU, without what it does not use.
 
-        Raises ValueError for primitives that the language does not have: a rival's superquadrics.
+        Raises ValueError for primitives that the language does not have, a rival's superquadrics; see also `matrices`.
         """
         if foreign := [batch.name for batch in self.primitives if batch.name not in KINDS]:
             raise ValueError(f"found primitives of the kind {foreign[0]!r}; expected {', '.join(KINDS)}")
-        matrices = [(logits > 0).cpu() for logits in self.logits]
+        matrices = [matrix.cpu() for matrix in self.matrices]
         batches = [batch.to("cpu") for batch in self.primitives]
         found = []
         for i in range(len(self)):

@@ -27,13 +27,14 @@ from .stump_net import PrimitiveHead, decoder
 
 LEAST, MOST = 1e-3, 2.0  # temperatures
 STATE = 256  # numbers of the GRU's state
+DEEPEST = 64  # layers: the paper's have five, and each next one sees all before
 
 
 @dataclass(frozen=True)
 class UCSGConfig:
     """each: primitives of a kind; layers; nodes: of all layers but the last; the rest: see StumpNetConfig.
 
-    Raises ValueError for sizes that are no whole numbers from 1.
+    Raises ValueError for sizes that are no whole numbers from 1, and more than 64 layers.
     """
 
     each: int = 32
@@ -48,6 +49,8 @@ class UCSGConfig:
         numbers = (self.each, self.layers, self.nodes, self.feature, self.points, self.neighbours)
         if not sizes(*numbers, *self.widths) or not self.widths:
             raise ValueError(f"found {self}; expected whole sizes of at least 1, and one width or more")
+        if self.layers > DEEPEST:
+            raise ValueError(f"found {self.layers} layers; expected at most {DEEPEST}")
 
 
 @dataclass(frozen=True)

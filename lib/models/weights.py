@@ -54,7 +54,7 @@ def load(network: type[Network], path: Path, device: torch.device | str = "cpu")
     """The network of a file, in evaluation mode. Random numbers drawn later are the same as without loading.
 
     Raises CheckpointError for a file that is missing, damaged, foreign, or of another network or other shapes, and for
-    weights that are not finite.
+    weights that are not finite, and variances below 0.
     """
     tensors, facts = read(path, network.__name__)
     tensors = {
@@ -64,6 +64,10 @@ def load(network: type[Network], path: Path, device: torch.device | str = "cpu")
         raise CheckpointError(
             f"{path}: found numbers that are not finite in {wrong[0]!r}; expected finite ones"
         )
+    if wrong := [
+        name for name, tensor in tensors.items() if name.endswith("running_var") and (tensor < 0).any()
+    ]:
+        raise CheckpointError(f"{path}: found variances below 0 in {wrong[0]!r}; expected some from 0")
     config = _config(network, facts.get("config"), path)
     with torch.device("meta"):  # shapes without memory: a wrong config cannot ask for more than there is
         _check(path, tensors, _build(network, config, path).state_dict())

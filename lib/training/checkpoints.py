@@ -4,6 +4,8 @@ The file is written whole under another name and then renamed: a run that is kil
 one before, never half of one.
 """
 
+import hashlib
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,7 +36,8 @@ def write_checkpoint(
     for name, weight in network.named_parameters():
         for moment, value in optimizer.state.get(weight, {}).items():
             tensors[f"{_kind(optimizer)}.{moment}.{name}"] = value
-    write(path, tensors, KIND, {"about": checkpoint.about, "log": checkpoint.log})
+    facts = {"about": checkpoint.about, "log": checkpoint.log}
+    write(path, tensors, KIND, facts | {"told": _digest(facts)})
 
 
 def read_checkpoint(
@@ -77,7 +80,14 @@ def _told(path: Path, facts: dict) -> Checkpoint:
         raise CheckpointError(
             f"{path}: is damaged: found no settings, or no log of epochs 1, 2, … in its header"
         )
+    if facts.get("told") != _digest({"about": about, "log": log}):
+        raise CheckpointError(f"{path}: is damaged: its settings and log are not those that were written")
     return Checkpoint(about, log)
+
+
+def _digest(facts: dict) -> str:
+    """Of settings and log: that of the arrays does not tell when these change."""
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
 def _same_run(path: Path, was: dict, now: dict) -> None:

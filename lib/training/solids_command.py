@@ -49,8 +49,10 @@ def clouds_of(options: argparse.Namespace, split: str) -> SolidSet:
 def solid_job(options: argparse.Namespace, train: SolidSet, student: Student, lesson: object) -> Job:
     """The student on the training clouds; some of validation are scored after every epoch.
 
-    Raises DataError, and TrainingError for a precision that surfaces cannot be placed with.
+    Raises DataError, and TrainingError for a precision that surfaces cannot be placed with, and for more points than
+    the clouds have.
     """
+    _check_counts(options, train)
     if options.precision != PRECISIONS[0]:
         raise TrainingError(
             f"found the precision {options.precision}; expected {PRECISIONS[0]}: bfloat16 keeps three digits of a "
@@ -65,6 +67,14 @@ def solid_job(options: argparse.Namespace, train: SolidSet, student: Student, le
     }  # fmt: skip
     task = SolidTask(student, train, clouds_of(options, "val"), about)
     return Job(task, schedule, network, train.describe())
+
+
+def _check_counts(options: argparse.Namespace, train: SolidSet) -> None:
+    for name, there in (("points", train.points.shape[1]), ("queries", train.queries.shape[1])):
+        if (asked := getattr(options, name)) > there:
+            raise TrainingError(
+                f"found --{name} {asked}, and clouds of {there} {name}; expected at most as many"
+            )
 
 
 def digest(clouds: SolidSet) -> str:

@@ -53,6 +53,7 @@ QUANTITIES = {
     "needed_nodes": ("needed", ".1f"),
     "seconds": ("s/shape", ".2f"),
 }
+AGAIN = {"chamfer_mean": "CD, seed 1", "iou": "IoU, seed 1"}
 _TINT, _PLAIN = 0.35, (188, 206, 232, 255)
 
 
@@ -191,18 +192,24 @@ def rivals(path: Path = RESULT, rows: str = "rows") -> dict[str, dict]:
     return {NAMES.get(name, name): found[name] for name in order if name in found}
 
 
+def rivals_again(path: Path = RESULT) -> dict[str, dict]:
+    """The rows of networks trained with a second seed; none where that was not measured."""
+    again = path.parent / SECOND / path.name
+    found = rivals(again) if again.is_file() else {}
+    return {name: row for name, row in found.items() if name not in WITHOUT_SEED}
+
+
 def rivals_table(path: Path = RESULT, rows: str = "rows") -> str:
     """The rows as lines of text: Chamfer distances times 1000, see data_scripts.measure_stump_net.
 
-    The last column has the mean Chamfer distance of networks trained with a second seed, where that was measured.
+    The last columns have what networks came to that were trained with a second seed, where that was measured.
     """
     found, quantities = rivals(path, rows), dict(QUANTITIES)
-    again = path.parent / SECOND / path.name
-    if again.is_file() and rows == "rows":
-        quantities["again"] = "CD, seed 1", ".2f"
-        for name, row in rivals(again, rows).items():
-            if name in found and name not in WITHOUT_SEED:
-                found[name] = found[name] | {"again": row["chamfer_mean"]}
+    again = rivals_again(path) if rows == "rows" else {}
+    for key, heading in AGAIN.items() if again else ():
+        quantities[f"{key}, again"] = heading, QUANTITIES[key][1]
+        for name in found.keys() & again.keys():
+            found[name] = found[name] | {f"{key}, again": again[name][key]}
     width = max(map(len, found)) + 2
     lines = [" " * width + "".join(f"{heading:>12s}" for heading, _ in quantities.values())]
     for name, row in found.items():
@@ -212,8 +219,9 @@ def rivals_table(path: Path = RESULT, rows: str = "rows") -> str:
 
 
 def rivals_figure(path: Path = RESULT) -> Figure:
-    """Bars: Chamfer distance (shorter is better) and IoU (longer is better) of each row."""
-    found = rivals(path)
+    """Bars: Chamfer distance (shorter is better) and IoU (longer is better) of each row; a mark where a second seed
+    came to."""
+    found, again = rivals(path), rivals_again(path)
     figure, axes = plt.subplots(1, 2, figsize=(9.5, 0.34 * len(found) + 0.9), dpi=100, sharey=True)
     plt.close(figure)
     panels = {
@@ -223,9 +231,15 @@ def rivals_figure(path: Path = RESULT) -> Figure:
     for ax, (key, title) in zip(axes, panels.items()):
         bars = ax.barh(list(found), [row[key] for row in found.values()], color=COLORS[: len(found)])
         ax.bar_label(bars, fmt="%.2f" if key == "chamfer_mean" else "%.1f", fontsize=8, padding=2)
+        both = [name for name in found if name in again]
+        ax.plot(
+            [again[name][key] for name in both], both, "k|", ms=11, mew=1.5, label="trained with another seed"
+        )
         ax.set_title(title, fontsize=9)
         ax.margins(x=0.12)
         ax.spines[["top", "right"]].set_visible(False)
     axes[0].invert_yaxis()
+    if again:
+        axes[0].legend(fontsize=8, frameon=False)
     figure.tight_layout()
     return figure

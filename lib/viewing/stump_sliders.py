@@ -17,6 +17,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from torch import Tensor
 
+from lib.interpreters.checks import check_points, whole
 from lib.interpreters.stump import ProgramError, Stump, layers
 from lib.models.reconstructing import surface
 from lib.viewing.figure import show
@@ -30,7 +31,7 @@ class StumpSliders(widgets.VBox):
     """A menu of primitives, a slider for each number of the chosen one, the solid beside them.
 
     cloud  the points (n, 3) that the stump was found in: its box is what is drawn
-    Raises TypeError for what is no stump, and ValueError for one of the plane.
+    Raises TypeError for what is no stump, and ValueError for one of the plane, and another cloud.
     """
 
     def __init__(self, stump: Stump, cloud: Float[Tensor, "n 3"]):
@@ -39,7 +40,7 @@ class StumpSliders(widgets.VBox):
         if stump.dimensions != 3:
             raise ValueError(f"found a stump of {stump.dimensions} dimensions; expected one of space")
         self.stump = self._first = stump.to(torch.float32)
-        self._cloud, self.chosen = cloud, 0
+        self._cloud, self.chosen = check_points(cloud, "xyz").float(), 0
         names = [f"F{k + 1} {primitive.name}" for k, primitive in enumerate(stump.primitives)]
         self._menu = widgets.Dropdown(
             options=[(name, k) for k, name in enumerate(names)], description="primitive"
@@ -63,7 +64,7 @@ class StumpSliders(widgets.VBox):
 
     def choose(self, number: int) -> None:
         """Show the sliders of this primitive. Raises ValueError for one that is not there."""
-        if not 0 <= number < len(self.stump.primitives):
+        if whole(number) is None or not 0 <= number < len(self.stump.primitives):
             raise ValueError(f"found primitive {number}; expected 0 to {len(self.stump.primitives) - 1}")
         self.chosen = number
         self._sliders = {name: self._slider(name, value) for name, value in self.numbers.items()}

@@ -16,8 +16,8 @@ Writes results/stump_net/reconstruction.json, one row for each network:
 Networks see as many points of a cloud as in their training; the search sees all 2,048, and their normals.
 
 NAMES are pretrained networks, or files of weights. Beside these there are a row for the clouds' bounding boxes, and the
-search without a network (lib.finding) on --searched of the clouds, with the same networks on these. Six networks on 200
-clouds take four minutes on one core; --quick takes 16 clouds and searches in 2.
+search without a network (lib.finding) on --searched of the clouds, with the same networks on these. Six networks on 400
+clouds take five minutes on one core; --quick takes 16 clouds and searches in 2.
 """
 
 import argparse

@@ -230,7 +230,8 @@ def rivals_figure(path: Path = RESULT) -> Figure:
     }
     for ax, (key, title) in zip(axes, panels.items()):
         bars = ax.barh(list(found), [row[key] for row in found.values()], color=COLORS[: len(found)])
-        ax.bar_label(bars, fmt="%.2f" if key == "chamfer_mean" else "%.1f", fontsize=8, padding=2)
+        form = "%.2f" if key == "chamfer_mean" else "%.1f"
+        ax.bar_label(bars, fmt=form, fontsize=8, label_type="center", color="white")
         both = [name for name in found if name in again]
         ax.plot(
             [again[name][key] for name in both], both, "k|", ms=11, mew=1.5, label="trained with another seed"

@@ -106,7 +106,9 @@ def test_the_table_has_the_measured_rows(tmp_path):
     path.write_text(json.dumps({"rows": {"zebra": row, "bounding_box": row | {"nodes": 1.0}}}))
     assert list(rivals(path)) == ["bounding box", "zebra"]
     lines = rivals_table(path).splitlines()
-    assert lines[1].split()[2:4] == ["1.23", "2.47"] and lines[2].split()[6:8] == ["-", "-"]
+    assert len({*map(len, lines)}) == 1 and len(lines) == 4
+    # bounding box 1.23 70.0 50.0 3.0 1.0 0.10, and a zebra without nodes
+    assert lines[2].split()[2:4] == ["1.23", "70.0"] and lines[3].split()[5:6] == ["-"]
     assert [text.get_text() for text in rivals_figure(path).axes[0].texts] == ["1.23", "1.23"]
     with pytest.raises(FileNotFoundError, match="measure_stump_net"):
         rivals(tmp_path / "none.json")
@@ -114,11 +116,9 @@ def test_the_table_has_the_measured_rows(tmp_path):
     second = {name: row | {"chamfer_mean": 9.0} for name in ("zebra", "bounding_box", "unknown")}
     (tmp_path / "seed_1" / "r.json").write_text(json.dumps({"rows": second}))
     lines = rivals_table(path).splitlines()
-    assert len(lines) == 3 and lines[0].endswith("CD, seed 1 IoU, seed 1")
-    assert lines[1].split()[-2:] == ["-", "-"] and lines[2].split()[-2:] == [
-        "9.00",
-        "70.0",
-    ]  # a box has no seed
+    assert len(lines) == 4 and [line.split()[-1] for line in lines[:2]] == ["IoU,", "1"]
+    assert lines[2].split()[-2:] == ["-", "-"]  # a box has no seed
+    assert lines[3].split()[-2:] == ["9.00", "70.0"]
     assert [ax.lines[0].get_xdata().tolist() for ax in rivals_figure(path).axes] == [[9.0], [70.0]]
 
 
